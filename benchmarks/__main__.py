@@ -82,6 +82,7 @@ BENCHMARKS = (
     Benchmark("overload.responsiveness", "response times of an overloaded site; 7 minutes"),
     Benchmark("calibration", "accuracy of cameras calibrated from walking people; 5 minutes"),
     Benchmark("scaling", "many simulated cameras on one best-view process; 4 minutes"),
+    Benchmark("scaling.areas", "a site that is divided by area, over 1 to 8 services; 8 minutes"),
     Benchmark("streaming", "splicing, viewers and HLS delay, beside ffmpeg and nginx; 6 minutes"),
     Benchmark("substream", "processor time of a camera with and without a substream; 3 minutes"),
     Benchmark("codecs", "cost and size of H.264, VP8 and passthrough; 1 minute"),

@@ -8,11 +8,10 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from benchmarks.scaling.simulated_hall import STRIDE, WINDOW, SimulatedHall, SimulatedTracker
+from benchmarks.scaling.simulated_hall import FPS, STRIDE, WINDOW, SimulatedHall, SimulatedTracker
 from server.messaging.messages import CameraTracks
 from server.messaging.packed_arrays import unpack_boxes, unpack_histograms
 
-_FPS = 25.0
 _EPOCHS = range(10, 20)
 _SHARE_DIGITS = 5
 
@@ -36,7 +35,7 @@ def track_message_size(hall: SimulatedHall) -> TrackMessageSize:
             message = tracker.message(epoch, places)
             packed += len(msgspec.msgpack.encode(message))
             text += len(msgspec.json.encode(_as_lists(message)))
-    to_rate = _FPS / STRIDE / len(_EPOCHS) / hall.cameras / 1e3
+    to_rate = FPS / STRIDE / len(_EPOCHS) / hall.cameras / 1e3
     return TrackMessageSize(packed * to_rate, text * to_rate)
 
 

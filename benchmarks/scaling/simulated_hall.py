@@ -13,6 +13,8 @@ from server.messaging.packed_arrays import pack_boxes, pack_histograms
 from tracking.boxes import Floats
 
 WIDTH, HEIGHT = 640, 360
+FPS = 25.0
+"""Of the site's configuration."""
 WINDOW, STRIDE = 15, 5
 _SPACING = 10.0
 """Meters between cameras."""
@@ -138,6 +140,15 @@ class SimulatedTracker:
         self._track: dict[int, int] = {}
         self._seen: dict[int, int] = {}
         self._count = 0
+
+    @property
+    def camera(self) -> str:
+        """The camera's name."""
+        return self._hall.ids[self._camera]
+
+    def visible(self, epoch: int) -> dict[int, int]:
+        """Return who was seen in the window that ends with an epoch, by track."""
+        return {track: person for person, track in self._track.items() if self._seen[person] == epoch}
 
     def message(self, epoch: int, places: Floats) -> CameraTracks:
         """Return the message of the window that ends with an epoch; `places` are positions in its frames."""

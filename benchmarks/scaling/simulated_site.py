@@ -1,4 +1,8 @@
-"""A site of simulated cameras with the real best-view process, and the measurement of its cost."""
+"""A site of simulated cameras with the real best-view process, and the measurement of its cost.
+
+The site is configured for 25 frames a second, so that windows and waiting times have their usual lengths.
+A large one gets slower pulses, by a pulse server of its own configuration.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +19,7 @@ from typing import IO
 import yaml
 
 from benchmarks.common.environment import ROOT, one_thread_environment
-from benchmarks.scaling.simulated_hall import HEIGHT, STRIDE, WIDTH, SimulatedHall
+from benchmarks.scaling.simulated_hall import FPS, HEIGHT, STRIDE, WIDTH, SimulatedHall
 from benchmarks.scaling.timed_service import LISTS, REST, STAGES, ServiceTimes
 from server.cli.generated_config import free_port
 
@@ -99,7 +103,7 @@ def _load(
     stages = {name: 1e3 * (stop.seconds[name] - start.seconds[name]) / frames for name in STAGES}
     stages[REST] = 1e3 * (stop.process - start.process) / frames - sum(stages.values())
     # Lists of people are sent by wall-clock time, whatever the pulse rate.
-    stages[LISTS] *= frames / (25.0 * (stop.at - start.at))
+    stages[LISTS] *= frames / (FPS * (stop.at - start.at))
     return SiteLoad(
         cameras=hall.cameras,
         people=hall.people,
@@ -107,8 +111,8 @@ def _load(
         fps=fps,
         services=1,
         stages=stages,
-        messages=25.0 * (stop.messages - start.messages) / frames,
-        megabytes=25.0 * (stop.size - start.size) / frames / 1e6,
+        messages=FPS * (stop.messages - start.messages) / frames,
+        megabytes=FPS * (stop.size - start.size) / frames / 1e6,
         memory=memory,
         late=late,
         epochs=stop.epochs - start.epochs,
@@ -118,14 +122,15 @@ def _load(
 @contextlib.contextmanager
 def _running(hall: SimulatedHall, fps: float, folder: Path, services: int) -> Iterator[list[_Service]]:
     sync, *https = (free_port() for _ in range(1 + services))
-    config = folder / "site.yaml"
+    config, slow_pulses = folder / "site.yaml", folder / "pulses.yaml"
     routers = [f"tcp/127.0.0.1:{free_port()}" for _ in range(services)]
+    site = {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT}
     content = {
-        "site": {"name": "hall", "fps": fps, "width": WIDTH, "height": HEIGHT},
+        "site": site,
         "sync": {"port": sync, "start_timeout_s": 3.0},
         "zenoh": {"connect": routers, "listen": routers[0]},
         "track": {"joint": False},  # simulated cameras send tracks alone
-        # The configured rate is the measured one, not the viewers': timeouts are counted in frames.
+        # Slower pulses are later than the service expects.
         "view": {"late_after_s": 12.5 / fps, "share": {"of": services}},
         "cameras": [
             {"id": name, "source": f"rtsp://{name}/", "ground": ground.tolist()}
@@ -133,9 +138,10 @@ def _running(hall: SimulatedHall, fps: float, folder: Path, services: int) -> It
         ],
     }
     config.write_text(yaml.safe_dump(content), encoding="utf-8")
+    slow_pulses.write_text(yaml.safe_dump(content | {"site": site | {"fps": fps}}), encoding="utf-8")
     halves = [range(hall.cameras // 2), range(hall.cameras // 2, hall.cameras)]
     with (folder / _LOG).open("wb") as log:
-        started = [_start(log, "server.cli.main", "sync", str(config))]
+        started = [_start(log, "server.cli.main", "sync", str(slow_pulses))]
         running = []
         for index, port in enumerate(https):
             times = folder / f"times{index}.json"

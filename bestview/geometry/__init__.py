@@ -12,6 +12,7 @@ from bestview.geometry.cross_view import (
     views_overlap,
 )
 from bestview.geometry.detection_probability import DetectionProbabilityMap
+from bestview.geometry.floor_areas import FloorAreas
 from bestview.geometry.ground_plane import (
     camera_height,
     foot_covariance,
@@ -31,6 +32,7 @@ __all__ = [
     "CameraGeometry",
     "CrossViewSettings",
     "DetectionProbabilityMap",
+    "FloorAreas",
     "boxes_touching_others",
     "camera_height",
     "estimate_bodies",

@@ -14,6 +14,7 @@ from typing import Annotated
 import typer
 
 from server.cli import client_commands, file_commands, site_commands
+from server.cli.areas import areas
 from server.cli.calibrate.command import calibrate
 from server.cli.models.command import app as models_app
 from server.supervisor.shutdown import SUPERVISED_VARIABLE
@@ -61,6 +62,7 @@ for run in (
     file_commands.evaluate,
     file_commands.scene,
     calibrate,
+    areas,
     client_commands.watch,
     client_commands.doctor,
     client_commands.status,

@@ -13,9 +13,10 @@ from math import gcd
 from pathlib import Path
 from typing import Annotated, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, PrivateAttr, model_validator
 from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
+from bestview import IdSeries
 from server.config.sections import (
     AccessSettings,
     CameraSettings,
@@ -81,6 +82,9 @@ class Config(BaseSettings):
     webhooks: Annotated[list[WebhookSettings], Field(max_length=20)] = []
     mqtt: MqttSettings = MqttSettings()
 
+    _of_site: tuple[str, ...] | None = PrivateAttr(None)
+    """All cameras of the site, where `cameras` are those of one service."""
+
     @classmethod
     def settings_customise_sources(
         cls,
@@ -125,6 +129,22 @@ class Config(BaseSettings):
                 if rule not in rules:
                     known = f"there are {', '.join(rules)}" if rules else "there are none"
                     raise ValueError(f"webhooks.{number}: rules: there is no rule {rule!r}; {known}")
+        return self
+
+    @model_validator(mode="after")
+    def _areas_have_all_cameras(self) -> Self:
+        areas = self.view.share.areas
+        if areas and self.sites.of > 1:
+            raise ValueError("view.share.areas: a site that is linked to others (sites) cannot have areas")
+        named = {camera for area in areas for camera in area.cameras}
+        for camera in sorted(named.difference(self.camera_ids)):
+            known = ", ".join(self.camera_ids)
+            raise ValueError(f"view.share.areas: there is no camera {camera!r}; there are {known}")
+        for camera in self.camera_ids if areas else ():
+            if camera not in named:
+                raise ValueError(
+                    f"view.share.areas: camera {camera} is in none; name it in that of its place"
+                )
         return self
 
     @model_validator(mode="after")
@@ -205,7 +225,8 @@ class Config(BaseSettings):
     def audio_sender(self) -> str | None:
         """The camera whose process sends the sound: its source, or the first for a file; None: no sound."""
         source = self.sound.source
-        return source if source is None or source in self.camera_ids else self.camera_ids[0]
+        cameras = self.site_camera_ids
+        return source if source is None or source in cameras else cameras[0]
 
     def peers_of(self, camera_id: str) -> Sequence[str]:
         """Return the cameras whose detections a camera uses: of the common ground; none if disabled.
@@ -245,6 +266,35 @@ class Config(BaseSettings):
             if camera.id == camera_id:
                 return camera
         raise KeyError(f"no camera {camera_id!r}; there are {', '.join(self.camera_ids)}")
+
+    def of_service(self) -> Self:
+        """Return the configuration of this best-view service, with the cameras and zones of its area."""
+        taken = self.view.share.cameras
+        if taken is None or self._of_site is not None:
+            return self
+        zones = [zone for zone in self.zones if zone.camera is None or zone.camera in taken]
+        known = {None, *(zone.id for zone in zones)}
+        own = self.model_copy(
+            update={
+                "cameras": [camera for camera in self.cameras if camera.id in taken],
+                "zones": zones,
+                "rules": [
+                    rule for rule in self.rules if rule.zone in known and set(rule.cameras) <= set(taken)
+                ],
+            }
+        )
+        own._of_site = tuple(self.camera_ids)  # noqa: SLF001 — of a copy
+        return own
+
+    @property
+    def person_numbers(self) -> IdSeries:
+        """The person numbers that this service assigns."""
+        return self.view.share.ids if self.view.share.areas else self.sites.ids
+
+    @property
+    def site_camera_ids(self) -> Sequence[str]:
+        """The names of all cameras of the site, also of those that this service does not take in."""
+        return self.camera_ids if self._of_site is None else self._of_site
 
     @property
     def camera_ids(self) -> Sequence[str]:

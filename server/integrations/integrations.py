@@ -17,7 +17,10 @@ log = logging.getLogger(__name__)
 
 
 class Integrations:
-    """The webhooks and the MQTT connection of a service; of several of one site the first has them."""
+    """The webhooks and the MQTT connection of a service.
+
+    Of several with the same people the first has the webhooks; the first of all has MQTT.
+    """
 
     def __init__(self, service: BestViewService) -> None:
         self._service = service
@@ -32,13 +35,13 @@ class Integrations:
         """Start what the configuration names, and end what it no longer names."""
         config = self._service.config
         settings = (config.mqtt, tuple(config.webhooks), config.http.public_url)
-        if settings == self._settings or config.view.share.index:
+        if settings == self._settings or not config.view.share.is_first:
             return
         self.stop()
         self._settings = settings
         url = config.http.public_url
         found: list[MqttPublisher | Webhook] = [Webhook(webhook, url) for webhook in config.webhooks]
-        if config.mqtt.host is not None:
+        if config.mqtt.host is not None and not config.view.share.index:
             found.append(MqttPublisher(config.mqtt, self._reader, url))
         self._running = [(each, asyncio.create_task(each.run(), name=type(each).__name__)) for each in found]
         for _, task in self._running:

@@ -33,7 +33,7 @@ def access_control_of(config: Config) -> dict[str, Any] | None:
     if config.zenoh.users is None:
         return None
     users = list(read_users(config.zenoh.users, SETTING))
-    return build_access_control(config.site.name, config.camera_ids, config.audio_sender, users)
+    return build_access_control(config.site.name, config.site_camera_ids, config.audio_sender, users)
 
 
 def build_access_control(

@@ -5,12 +5,16 @@ from __future__ import annotations
 from typing import Annotated
 
 import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from server.messaging.number_types import Pulse
 from server.messaging.packed_arrays import (
     PackedDetections,
     check_detections,
     histogram_bins,
+    select_detections,
+    select_histograms,
     unpack_detections,
     unpack_histograms,
 )
@@ -37,6 +41,15 @@ class FrameObservations(msgspec.Struct, frozen=True, kw_only=True):
         """
         if histogram_bins(self.histograms, check_detections(self.boxes)) is None:
             raise ValueError("there is not a histogram of every box")
+
+
+def select_observations(frame: FrameObservations, kept: NDArray[np.bool_]) -> FrameObservations:
+    """Return a frame with some of its N detections, those of the mask (N,)."""
+    return msgspec.structs.replace(
+        frame,
+        boxes=select_detections(frame.boxes, kept),
+        histograms=select_histograms(frame.histograms, kept),
+    )
 
 
 def unpack_observations(frame: FrameObservations) -> Detections:

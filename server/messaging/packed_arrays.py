@@ -100,6 +100,11 @@ def unpack_detections(packed: PackedDetections) -> tuple[NDArray[np.float64], ND
     return rows[:, :4], rows[:, 4]
 
 
+def select_detections(packed: PackedDetections, kept: NDArray[np.bool_]) -> PackedDetections:
+    """Return some of N packed detections, those of the mask (N,)."""
+    return np.frombuffer(packed, _COORDINATE).reshape(-1, 5)[kept].tobytes()
+
+
 def check_detections(packed: PackedDetections) -> int:
     """Check what a sender has packed; return the number of detections.
 
@@ -125,6 +130,12 @@ def unpack_histograms(packed: bytes, count: int) -> NDArray[np.float64]:
     shares = np.frombuffer(packed, _SHARE).astype(np.float64)
     histograms = shares.reshape(count, shares.size // max(count, 1))
     return np.asarray(histograms / np.maximum(histograms.sum(axis=1, keepdims=True), 1.0))
+
+
+def select_histograms(packed: bytes, kept: NDArray[np.bool_]) -> bytes:
+    """Return some of N packed histograms, those of the mask (N,)."""
+    shares = np.frombuffer(packed, _SHARE)
+    return shares.reshape(len(kept), shares.size // max(len(kept), 1))[kept].tobytes()
 
 
 def histogram_bins(packed: bytes, count: int = 1) -> int | None:

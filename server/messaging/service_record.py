@@ -57,6 +57,8 @@ class ServiceRecord(msgspec.Struct, frozen=True, kw_only=True):
     lowest leads; of equal ones, that with the lowest index. One that was stopped follows the others."""
     cameras: Annotated[dict[str, CameraIdentitySnapshot], msgspec.Meta(max_length=_CAMERAS_MAX)]
     """What each camera tracks."""
+    in_area: Annotated[dict[PersonNumber, Pulse], msgspec.Meta(max_length=_PEOPLE_MAX)] = {}
+    """By number, when each person in the area of the service was seen first; empty: there are no areas."""
     deletions: Annotated[list[DeletedPerson], msgspec.Meta(max_length=DELETIONS_MAX)] = []
     """The newest deletions, its own and others', in order: every service carries them out."""
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 
 import msgspec
 
-from server.config.password_file import password_of
 from server.config.pulse_access import bestview_client_name
 from server.config.sections import LinkSettings, site_user
 from server.config.site_config import Config
@@ -53,13 +52,18 @@ class BusConnection:
             UserError: the address is in use, or a password file cannot be read.
         """
         self._bus = bus = Bus.router(
-            self._config.zenoh, access_control_of(self._config), len(self._config.cameras)
+            self._config.zenoh, access_control_of(self._config), len(self._config.site_camera_ids)
         )
-        for topic, handler in camera_handlers.items():
-            self.inboxes.append(bus.subscribe(self._keys.camera("*", topic), handler))
+        taken = self._config.view.share.cameras
+        # One subscription for all cameras, but nothing from those of other areas.
+        cameras = ["*"] if taken is None else sorted(taken)
+        for camera in cameras:
+            for topic, handler in camera_handlers.items():
+                self.inboxes.append(bus.subscribe(self._keys.camera(camera, topic), handler))
         if on_audio is not None:
             self.inboxes.append(bus.subscribe(self._keys.sound, on_audio))
-        bus.watch_alive(self._keys.camera("*", "alive"), on_alive)
+        for camera in cameras:
+            bus.watch_alive(self._keys.camera(camera, "alive"), on_alive)
         bus.declare_alive(self._keys.bestview("alive", self._index))
 
     def exchange_records(
@@ -106,8 +110,6 @@ class BusConnection:
             UserError: the password file cannot be read, or the address is not supported.
         """
         user = None if link.users is None else site_user(self._config.site.name)
-        if link.users is not None and user is not None:
-            password_of(link.users, user, f"sites.link.{name}.users")  # named so in an error
         bus = Bus.client(link.bus(self._config.zenoh.lease_s), user)
         self._other_sites.append(bus)
         self.inboxes.append(bus.subscribe(ZenohKeys(name).bestview("**/people"), on_people))

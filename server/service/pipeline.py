@@ -18,9 +18,10 @@ from server.messaging.messages import GopChoices
 from server.service.buffer_lengths import BufferLengths
 from server.service.bus_connection import BusConnection
 from server.service.calibration.walk_session import WalkSession
-from server.service.decision_files.live_decision_writer import LiveDecisionWriter
+from server.service.decision_files.live_decision_writer import LiveDecisionWriter, open_decision_files
 from server.service.decision_state import DecisionState
 from server.service.deletion.recording_deletion import RecordingDeletion
+from server.service.identity.service_area import area_to_take_in
 from server.service.identity.state_replication import SNAPSHOT_WAIT_S, StateReplication
 from server.service.ingest.backlog import BacklogMonitor
 from server.service.ingest.epoch_aligner import Epoch, EpochAligner
@@ -41,7 +42,7 @@ from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
 from server.service.view_selection.decider import GopDecision, ViewDecider, camera_homographies
 from server.service.view_selection.delay_modes import ModeDecision
-from server.system.errors import UserError, reason_of
+from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
 
@@ -93,6 +94,7 @@ class BestViewPipeline:
         self.decider = ViewDecider(
             config, camera_homographies(config), lambda camera, pulse: self.frame_buffers[camera].has(pulse)
         )
+        self._area = area_to_take_in(config, camera_homographies(config))
         self.joint = JointWorker(config)
         self.decision_state = DecisionState(fps)
         people = self.decider.people
@@ -107,6 +109,7 @@ class BestViewPipeline:
             fps,
             partial(self.bus.send_to_camera, "identities"),
             sends=lambda: self.replication.leads,
+            send_to=config.view.share.keepers,
             deleted=self.recording_deletion.forgotten,
         )
         self.replication = ServiceReplication(config, people, self.state_replication, self.bus)
@@ -154,7 +157,9 @@ class BestViewPipeline:
             UserError: the output folder cannot be written.
         """
         if self._out is not None:  # once all ports are open: a failed start leaves no files
-            self.decision_writer = self.loss_recorder.decision_writer = self._open_decision_files(self._out)
+            self.decision_writer = self.loss_recorder.decision_writer = open_decision_files(
+                self._out, self.config.camera_ids, self.decider.people.letterboxes
+            )
         await self.joint.start()
         self.recorder.open()
         for deleted in await self.recording_deletion.read_journal():
@@ -228,13 +233,8 @@ class BestViewPipeline:
             log.warning(text, backlog / self.config.site.fps, more)
 
     def _next_epoch(self) -> Epoch | None:
-        return self.aligner.take_next_ready(self.pulses.newest)
-
-    def _open_decision_files(self, out: Path) -> LiveDecisionWriter:
-        try:
-            return LiveDecisionWriter(out, self.config.camera_ids, self.decider.people.letterboxes)
-        except OSError as error:
-            raise UserError(f"{out}: cannot write there: {reason_of(error)}") from error
+        epoch = self.aligner.take_next_ready(self.pulses.newest)
+        return epoch if epoch is None or self._area is None else self._area.near(epoch)
 
     def apply_live_view_settings(self, view: ViewSettings) -> None:
         """Select views by other settings from the next GOP on, as far as they can change at run time.
@@ -340,8 +340,8 @@ class BestViewPipeline:
         self.ingest.forget_thumbnails_before(decision.first - self.decider.people.forget_after)
 
     def _evaluate_rules(self, decision: GopDecision) -> list[SiteEvent]:
-        """Evaluate the rules and publish events; of several services that share a site the first one does."""
-        if self.config.view.share.index:
+        """Evaluate the rules and publish events; of several services with the same people one does."""
+        if not self.config.view.share.is_first:
             return []
         events = self.rules.put(decision, self.decider.people.registry.names, self.pulses.pulse0)
         for event in events:

@@ -43,7 +43,7 @@ async def bestview_process(running: ActiveConfig, out: Path | None = None) -> No
     config = running.now
     check_viewers(config)
     check_bus(config)
-    pipeline = BestViewPipeline(add_synthetic_homographies(config), out)
+    pipeline = BestViewPipeline(add_synthetic_homographies(config).of_service(), out)
     reload = reloader()
     reload_task = asyncio.create_task(_follow(running, pipeline), name="reload")
     try:
@@ -106,7 +106,7 @@ async def _follow(running: ActiveConfig, pipeline: BestViewPipeline) -> None:
     """Apply the settings of reloaded configurations that a running service can change."""
     async for reload in reloads(running):
         try:
-            pipeline.apply_config(reload.now)
+            pipeline.apply_config(reload.now.of_service())
         except UserError as error:
             log.warning("%s: %s; the previous configuration stays in force", running.path, error)
         except Exception:

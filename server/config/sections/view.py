@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from typing import Annotated, Self
 
-from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
+from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
 
-from bestview import IdentitySettings, QualitySettings
-from server.config.sections.base import Section
+from bestview import IdentitySettings, IdSeries, QualitySettings
+from server.config.sections.base import Identifier, Section
 from server.config.unknown_keys import no_unknown_keys
 from tracking.types import RiskReason
 
@@ -26,12 +27,37 @@ LIVE_VIEW_SETTINGS = (
 Seconds = Annotated[float, Field(ge=0, le=3600)]
 
 
+class AreaSettings(Section):
+    """A part of the site that has a best-view service of its own."""
+
+    cameras: Annotated[list[Identifier], Field(min_length=1)]
+    """People whom most of them see are in the area."""
+    also: list[Identifier] = []
+    """Cameras of other areas that see a part of it: who comes or goes keeps their number."""
+    floor: tuple[float, float, float, float] | None = None
+    """Least x and y, largest x and y on the ground: then who stands there is in the area, whichever cameras
+    see them, and nobody beyond `margin` is taken in."""
+    margin: NonNegativeFloat = 5.0
+    """In units of the ground. Who walks in is known to both areas for as long as that takes."""
+
+    @model_validator(mode="after")
+    def _has_a_floor(self) -> Self:
+        if self.floor is not None and not (self.floor[0] < self.floor[2] and self.floor[1] < self.floor[3]):
+            raise ValueError(
+                f"floor: {list(self.floor)} is no rectangle: give its least x and y, then its largest"
+            )
+        return self
+
+
 class ShareSettings(Section):
     """Several best-view services of one site: for one share of the people each, and to replace each other."""
 
     of: PositiveInt = 1
     """Number of shares: a service decides for people whose number has its index's remainder by this. Services
     of one share replace each other."""
+    areas: list[AreaSettings] = []
+    """One for each share: a service then takes in only the cameras of its area, and decides for the people
+    there. None: every service takes in all cameras."""
     index: NonNegativeInt = 0
     """Index of this service."""
     servers: list[str] = []
@@ -53,6 +79,48 @@ class ShareSettings(Section):
     def share(self) -> int:
         """The share of this service."""
         return self.index % self.of
+
+    @property
+    def is_first(self) -> bool:
+        """Whether no service before this one has the same people: it alone evaluates rules about them."""
+        return self.index < (self.of if self.areas else 1)
+
+    @property
+    def cameras(self) -> Collection[str] | None:
+        """The cameras that this service takes in; None: all."""
+        if not self.areas:
+            return None
+        area = self.areas[self.share]
+        return [*area.cameras, *area.also]
+
+    @property
+    def keepers(self) -> Collection[str] | None:
+        """The cameras that keep what this service knows of people, for when it restarts; None: all.
+
+        A camera keeps it for one service.
+        """
+        return self.areas[self.share].cameras if self.areas else None
+
+    @property
+    def ids(self) -> IdSeries:
+        """The person numbers that this service assigns: each area has its own."""
+        return IdSeries(self.share, self.of) if self.areas else IdSeries()
+
+    @model_validator(mode="after")
+    def _areas_fit(self) -> Self:
+        if self.areas and len(self.areas) != self.of:
+            raise ValueError(f"areas: has {len(self.areas)}, but there are {self.of} shares (of)")
+        names = [camera for area in self.areas for camera in area.cameras]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(
+                    f"areas: camera {name} is in two; name it in also of the one it sees less of"
+                )
+        for number, area in enumerate(self.areas):
+            for name in area.also:
+                if name in area.cameras or name not in names:
+                    raise ValueError(f"areas.{number}: also: {name!r} is not a camera of another area")
+        return self
 
     @model_validator(mode="after")
     def _fits(self) -> Self:

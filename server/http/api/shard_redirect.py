@@ -1,4 +1,4 @@
-"""Redirects requests for a person: to the best-view service of that person, or to the site that sees them."""
+"""Redirects requests for a person or a camera to the best-view service that has them, or to another site."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ _LIVE = {
 thumbnails are of this one."""
 _PAST = {"from", "to", "at"}
 _OBJECT_PATH = re.compile(r"/(?:api/)?objects/([0-9]{1,9})/")
+_CAMERA_PATH = re.compile(r"/(?:api/)?cameras/([^/]+)/")
 
 
 @web.middleware
@@ -31,9 +32,13 @@ async def redirect_to_shard(
     """Answer 307 with the other service's URL; 404 if view.share.servers does not name it."""
     path = _OBJECT_PATH.match(request.path)
     if path is None:
-        return await handler(request)
+        camera = _CAMERA_PATH.match(request.path)
+        server = None if camera is None else request.app[SERVICE].cameras.server_of(camera[1])
+        return await handler(request) if server is None else _redirect(server, request, with_token=True)
     number = int(path[1])
     shard = request.app[SERVICE].people.shard_of(number)
+    if not shard.is_own and shard.has_past and not _is_live(request):
+        return await handler(request)  # of when the person was here
     if shard.is_own:
         there = _at_other_site(request, number)
         return await handler(request) if there is None else _redirect(there.url, request, there.knows_token)
@@ -48,11 +53,15 @@ async def redirect_to_shard(
 
 def _at_other_site(request: web.Request, number: int) -> PersonAtSite | None:
     """Return where a person is whose live pictures are requested; None: here, or the sender may not know."""
-    resource = request.match_info.route.resource
-    if resource is None or resource.canonical not in _LIVE or request.query.keys() & _PAST:
+    if not _is_live(request):
         return None
     service = request.app[SERVICE]
     return service.sites.find(service.people.current_number(number), request.app[ACCESS].token_of(request))
+
+
+def _is_live(request: web.Request) -> bool:
+    resource = request.match_info.route.resource
+    return resource is not None and resource.canonical in _LIVE and not request.query.keys() & _PAST
 
 
 def _redirect(server: str, request: web.Request, with_token: bool) -> web.Response:

@@ -22,7 +22,7 @@ from server.service.recording.media_files import run_in_reader_thread
 from server.service.rules.engine import SiteEvent
 from server.service.view_selection.decider import GopDecision
 from server.service.view_selection.delay_modes import ModeDecision
-from server.system.errors import reason_of
+from server.system.errors import UserError, reason_of
 
 log = logging.getLogger(__name__)
 
@@ -132,3 +132,17 @@ class LiveDecisionWriter:
         if self._missing:
             rows.append(f"{self._missing.start + 1},,not written up to {self._missing.stop}\n")
         return rows
+
+
+def open_decision_files(
+    folder: Path, cameras: Sequence[str], letterboxes: Mapping[str, Letterbox]
+) -> LiveDecisionWriter:
+    """Return the writer of a running site's files in a folder.
+
+    Raises:
+        UserError: a file cannot be written.
+    """
+    try:
+        return LiveDecisionWriter(folder, cameras, letterboxes)
+    except OSError as error:
+        raise UserError(f"{folder}: cannot write there: {reason_of(error)}") from error

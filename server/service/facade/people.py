@@ -14,7 +14,7 @@ from server.service.facade.errors import (
     UnknownObjectError,
 )
 from server.service.facade.view_selection import ViewSelection, view_selection_of
-from server.service.identity.sharding import replacement_addresses, shard_address, shard_of
+from server.service.identity.sharding import replacement_addresses, share_address
 from server.service.ingest.ingest import Thumbnail
 from server.service.pipeline import BestViewPipeline
 from server.service.view_selection.delay_modes import DelayMode
@@ -71,6 +71,8 @@ class Shard:
     """Whether it is this service."""
     server: str | None
     """Its base URL; None where the configuration does not name it."""
+    has_past: bool
+    """Whether people come and go between services, so that this one has recorded some of their past."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,10 +136,10 @@ class PeopleService:
 
     def list_remote_people(self) -> list[RemotePerson]:
         """Return the people of the site's other services, by number."""
-        share = self._pipeline.config.view.share
+        share, people = self._pipeline.config.view.share, self._pipeline.decider.people
         return [
-            RemotePerson(number, shard_address(number, share))
-            for number in self._pipeline.decider.people.of_other_shards
+            RemotePerson(number, share_address(people.of_service.share_of(number), share))
+            for number in people.of_other_shards
         ]
 
     @property
@@ -148,8 +150,8 @@ class PeopleService:
     def shard_of(self, number: int) -> Shard:
         """Return the service that a number belongs to, whether or not it is in use."""
         share = self._pipeline.config.view.share
-        index = shard_of(number, share)
-        return Shard(index, index == share.share, shard_address(number, share))
+        index = self._pipeline.decider.people.of_service.share_of(number)
+        return Shard(index, index == share.share, share_address(index, share), bool(share.areas))
 
     def current_number(self, number: int) -> int:
         """Return the current number of a merged one, as far as decisions have been published."""

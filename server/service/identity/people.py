@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +13,14 @@ from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
 from server.service.identity.camera_window import CameraWindow, WindowReader
 from server.service.identity.common_ground import CommonGround
+from server.service.identity.expected_tracks import ExpectedTracks
 from server.service.identity.id_switch_repair import IdSwitchRepair
 from server.service.identity.local_numbers import TrackName
 from server.service.identity.manual_overrides import ManualOverrides, numbers_of_correction
 from server.service.identity.numbered_boxes import numbered_boxes
 from server.service.identity.person_registry import PersonRegistry
 from server.service.identity.published_tracks import PublishedTracks
-from server.service.identity.sharding import own_numbers
+from server.service.identity.sharding import PeopleByNumber, PeopleOfService, TracksOfPeople
 from server.service.identity.track_parts import (
     UNCONFIRMED,
     UNKNOWN,
@@ -34,8 +34,8 @@ from server.service.ingest.epoch_aligner import Epoch
 from server.service.ingest.window_history import HistorySpan, WindowHistory
 from tracking.frame_rate import frames_in
 
-ALL = ShareSettings()
-"""A single service for all people."""
+ALL = PeopleByNumber(ShareSettings())
+"""A single service has all people."""
 _COMPARED_S = 1.0
 """Seconds of each camera's final tracks that are kept, to find the identity switches of its next revision."""
 _RECENT_S = 4.0
@@ -45,8 +45,8 @@ _RECENT_S = 4.0
 class PersonTracker:
     """Associates the cameras' tracks epoch by epoch, and keeps recent boxes.
 
-    ``homographies`` map each camera's image to the ground; None where there is none. ``share`` is
-    this service's shard; identities are computed for all people, identically in every service. Tracks are
+    ``homographies`` map each camera's image to the ground; None where there is none. ``of_service`` says
+    which people are this service's; identities are computed for all people in the cameras' views. Tracks are
     final ``lag`` frames before an epoch's end, and are associated up to there. ``overhead`` are the
     cameras that look straight down, ``joint_cameras`` those that are tracked jointly where they overlap;
     ``fps`` are the site's frames a second, ``ids`` the numbers to assign, of several sites.
@@ -59,7 +59,7 @@ class PersonTracker:
         homographies: Mapping[str, NDArray[np.float64] | None],
         site_size: tuple[int, int],
         lag: int,
-        share: ShareSettings = ALL,
+        of_service: PeopleOfService = ALL,
         overhead: Collection[str] = (),
         fps: float = 25.0,
         joint_cameras: Sequence[str] = (),
@@ -74,7 +74,8 @@ class PersonTracker:
         """Frames unseen after which people are forgotten."""
         self.registry = PersonRegistry(settings.maximum_departed_people)
         """All people, those of other shards included."""
-        self._share = share
+        self.of_service = of_service
+        """Which of the people are this service's."""
         self._histories = {camera: WindowHistory[CameraWindow]() for camera in cameras}
         self._lag, self._recent, self._compared = lag, frames_in(_RECENT_S, fps), frames_in(_COMPARED_S, fps)
         self._id_switch_repair = IdSwitchRepair(self._registry, self._reader)
@@ -88,8 +89,7 @@ class PersonTracker:
         """The first frame that is still needed."""
         self._corrections: list[Merge | Split] = []
         self._overrides = ManualOverrides()
-        self._expected: dict[TrackName, tuple[int, int]] = {}
-        """Tracks expected from an earlier run: their person number, and the pulse at which that run ended."""
+        self.expected = ExpectedTracks()
         self._newest = -1
         """The last frame of the newest epoch."""
 
@@ -110,11 +110,7 @@ class PersonTracker:
         for key, parts in track_parts(update.person_ids).items():
             self._parts[key] = merge_settled_parts(self._parts.get(key, ()), parts, self._needed_from)
         self._id_switch_repair.overlay(self._parts)
-        keys = chain.from_iterable(window.keys for window in windows)
-        seen = chain.from_iterable(window.visible_spans() for window in windows)
-        for key, (first, last) in zip(keys, seen, strict=True):
-            self._last_reported[key] = epoch.last
-            self.registry.record_visible(self._parts.get(key, ()), first, last)
+        self._record_visible(windows, epoch.last)
         self.registry.update_presence(update.departed, update.returned)
         for merge in update.merged:
             self._merge(merge.kept, merge.lost)
@@ -130,13 +126,12 @@ class PersonTracker:
     @property
     def known(self) -> list[int]:
         """The numbers of this shard's people, in order; departed ones included."""
-        return own_numbers(self.registry.all_numbers, self.registry.merged, self._share)
+        return self.of_service.own(self.registry.all_numbers, self.registry.merged)
 
     @property
     def of_other_shards(self) -> list[int]:
         """The numbers of the other shards' people, in order."""
-        known = set(self.known)
-        return [number for number in self.registry.all_numbers if number not in known]
+        return self.of_service.others(self.registry.all_numbers, self.registry.merged)
 
     @property
     def next_number(self) -> int:
@@ -149,14 +144,8 @@ class PersonTracker:
 
     def expect(self, tracks: Mapping[TrackName, int], last_pulse: int) -> None:
         """Expect tracks that belonged to these people in an earlier run, which ended with `last_pulse`."""
-        self._expected |= {
-            track: (number, last_pulse) for track, number in tracks.items() if not self.is_known(track)
-        }
-
-    def cancel_expected(self, tracks: Iterable[TrackName]) -> None:
-        """Expect these tracks no longer: if they appear, they are new people."""
-        for track in tracks:
-            self._expected.pop(track, None)
+        new = {track: number for track, number in tracks.items() if not self.is_known(track)}
+        self.expected.add(new, last_pulse)
 
     @property
     def manual_merges(self) -> dict[int, int]:
@@ -217,7 +206,7 @@ class PersonTracker:
         self._id_switch_repair.forget(numbers)
         self.published.forget(numbers)
         self.registry.forget(numbers)
-        self._expected = {track: of for track, of in self._expected.items() if of[0] not in numbers}
+        self.expected.forget(numbers)
         self._corrections = [
             each for each in self._corrections if not (set(numbers_of_correction(each)) & set(numbers))
         ]
@@ -310,17 +299,29 @@ class PersonTracker:
         history.put(window, window.first, window.message.last)
         return window
 
+    def _record_visible(self, windows: Iterable[CameraWindow], now: int) -> None:
+        """Record when people were visible in the windows of an epoch, and in which cameras."""
+        seen = []
+        for window in windows:
+            numbers: list[int | None] = []
+            for key, (first, last) in zip(window.keys, window.visible_spans(), strict=True):
+                self._last_reported[key] = now
+                parts = self._parts.get(key, ())
+                self.registry.record_visible(parts, first, last)
+                is_known = bool(parts) and first <= last and parts[-1].number != UNCONFIRMED
+                numbers.append(parts[-1].number if is_known else None)
+            seen.append(TracksOfPeople(window.message, numbers))
+        self.of_service.update(seen, now)
+
     def _recall(self, own: Sequence[CameraWindow], joint: Sequence[CameraWindow], epoch: Epoch) -> None:
         """Assign expected tracks to their people of an earlier run when they first appear."""
         linked = {} if epoch.joint is None else self._ground.link(epoch.joint, epoch.tracks, joint)
-        if not self._expected:
-            return
         origin = self._reader.local_numbers.origin
         appeared = {origin(key): key for window in own for key in window.keys}
         appeared |= {name: key for name, key in linked.items() if key not in self._parts}
         for name, key in appeared.items():
-            number, pulse = self._expected.pop(name, (0, 0))
-            if number:
+            if (expected := self.expected.take(name)) is not None:
+                number, pulse = expected
                 self._registry.recall(key, self.registry.current(number), pulse)
 
     def _merge(self, kept: int, lost: int) -> None:
@@ -329,6 +330,7 @@ class PersonTracker:
 
     def _replace(self, numbers: Mapping[int, int]) -> None:
         """Replace numbers in the tracks."""
+        self.of_service.renumber(numbers)
         self._id_switch_repair.merge(numbers)
         self._parts = {
             key: [TrackPart(part.first, numbers.get(part.number, part.number)) for part in parts]
@@ -343,3 +345,4 @@ class PersonTracker:
             self._reader.local_numbers.forget(key)
         self._ground.keep_only(self._last_reported)
         self.registry.forget_unseen_since(now - self.forget_after)
+        self.of_service.keep_only(self.registry.first_seen.keys())

@@ -1,27 +1,168 @@
-"""Distributes people over the best-view services of one site."""
+"""Distributes people over the best-view services of one site: by their numbers, or by where they are."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
 
 from server.config.sections import ShareSettings
+from server.config.site_config import Config
+from server.messaging.messages import CameraTracks
+from server.service.identity.service_area import Floats, ServiceArea
+
+_RELEASED_AFTER_S = 2.0
+"""Seconds after which somebody who is not in the area any more, and is in another one, leaves it."""
 
 
-def shard_of(number: int, share: ShareSettings) -> int:
-    """Return the share that a number belongs to: the same in all services, without communication."""
-    return number % share.of
+@dataclass(frozen=True, slots=True, eq=False)
+class TracksOfPeople:
+    """Whom a camera's tracks show at the end of an epoch.
 
-
-def own_numbers(numbers: Iterable[int], merged: Mapping[int, int], share: ShareSettings) -> list[int]:
-    """Return the numbers that belong to this service's share, in the given order.
-
-    Besides the share's own numbers these are people into whom one of them was merged, so that viewers of the
-    old number need not change the service.
+    Attributes:
+        message: with T tracks.
+        numbers: T of them; None: not visible, or not confirmed.
     """
-    if share.of == 1:
-        return list(numbers)
-    kept_numbers = {new for old, new in merged.items() if shard_of(old, share) == share.share}
-    return [number for number in numbers if shard_of(number, share) == share.share or number in kept_numbers]
+
+    message: CameraTracks
+    numbers: Sequence[int | None]
+
+
+class PeopleOfService(Protocol):
+    """Which of the people whom it knows a service decides for; the others are other services'."""
+
+    def own(self, numbers: Iterable[int], merged: Mapping[int, int]) -> list[int]:
+        """Return the numbers that belong to the service, in the given order.
+
+        `merged`: by number, that of the person into whom they were merged.
+        """
+        ...
+
+    def others(self, numbers: Iterable[int], merged: Mapping[int, int]) -> list[int]:
+        """Return the numbers of other services' people, of those known here or by what they say."""
+        ...
+
+    def share_of(self, number: int) -> int:
+        """Return the share that a number belongs to, as far as is known."""
+        ...
+
+    def update(self, seen: Iterable[TracksOfPeople], frame: int) -> None:
+        """Take in where people are seen in an epoch that ends with a frame."""
+        ...
+
+    def renumber(self, numbers: Mapping[int, int]) -> None:
+        """Replace people's numbers by others."""
+        ...
+
+    def keep_only(self, numbers: Collection[int]) -> None:
+        """Forget everybody else."""
+        ...
+
+
+class PeopleByNumber:
+    """People are divided by number, the same in all services, without communication."""
+
+    def __init__(self, share: ShareSettings) -> None:
+        self._share = share
+
+    def own(self, numbers: Iterable[int], merged: Mapping[int, int]) -> list[int]:
+        """Return the numbers of the share.
+
+        Besides its own these are people into whom one of them was merged, so that viewers of the old number
+        need not change the service.
+        """
+        of, share = self._share.of, self._share.share
+        kept_numbers = {new for old, new in merged.items() if old % of == share}
+        return [number for number in numbers if number % of == share or number in kept_numbers]
+
+    def others(self, numbers: Iterable[int], merged: Mapping[int, int]) -> list[int]:
+        """Return the numbers of the other shares, in the given order."""
+        every = list(numbers)
+        own = set(self.own(every, merged))
+        return [number for number in every if number not in own]
+
+    def share_of(self, number: int) -> int:
+        """Return the share of a number, whether or not it is in use."""
+        return number % self._share.of
+
+    def update(self, seen: Iterable[TracksOfPeople], frame: int) -> None:
+        """Ignore where people are."""
+
+    def renumber(self, numbers: Mapping[int, int]) -> None:
+        """Ignore it: numbers stay in their share."""
+
+    def keep_only(self, numbers: Collection[int]) -> None:
+        """Ignore it: nothing is known about single people."""
+
+
+class PeopleOfArea:
+    """People are divided by area. Who is at a border is known to both services, under one number.
+
+    Somebody is in the area where most of the cameras say they are (`ServiceArea.votes`); if equally many say
+    that they are not, they are in both, as each service knows only some of the cameras. A service from which
+    another one takes somebody over keeps them for a while, so that no stream ends before the next one begins.
+    """
+
+    def __init__(self, share: ShareSettings, area: ServiceArea, fps: float) -> None:
+        self._share, self._area = share, area
+        self._released_after = round(_RELEASED_AFTER_S * fps)
+        self._seen: dict[int, int] = {}
+        """By number, of the people in the area, the last frame in which they certainly were."""
+        self._elsewhere: dict[int, int] = {}
+        """By number, the area of people whom other services have."""
+
+    @property
+    def present(self) -> Collection[int]:
+        """The numbers of people in the area."""
+        return self._seen.keys()
+
+    def own(self, numbers: Iterable[int], merged: Mapping[int, int]) -> list[int]:
+        """Return the numbers of people in the area."""
+        kept = {merged.get(number, number) for number in self._seen}
+        return [number for number in numbers if number in kept]
+
+    def others(self, numbers: Iterable[int], merged: Mapping[int, int]) -> list[int]:  # noqa: ARG002
+        """Return the numbers of people whom other services say they have, in order."""
+        return sorted(number for number in self._elsewhere if number not in self._seen)
+
+    def share_of(self, number: int) -> int:
+        """Return the area where somebody is; this one if nobody else says that they are there."""
+        own = self._share.share
+        return own if number in self._seen else self._elsewhere.get(number, own)
+
+    def update(self, seen: Iterable[TracksOfPeople], frame: int) -> None:
+        """Take over who is in the area, and release who is in another one."""
+        votes: dict[int, list[bool]] = {}
+        for of_camera in seen:
+            for number, vote in zip(of_camera.numbers, self._area.votes(of_camera.message), strict=True):
+                if number is not None:
+                    votes.setdefault(number, []).append(vote)
+        self._seen |= {number: frame for number, found in votes.items() if 2 * sum(found) >= len(found)}
+        self._seen = {
+            number: last
+            for number, last in self._seen.items()
+            if number not in self._elsewhere or frame - last <= self._released_after
+        }
+
+    def hear(self, elsewhere: Mapping[int, int]) -> None:
+        """Replace what other services say about who is in their areas, by number."""
+        self._elsewhere = dict(elsewhere)
+
+    def renumber(self, numbers: Mapping[int, int]) -> None:
+        """Replace people's numbers by others."""
+        self._seen = {numbers.get(number, number): last for number, last in self._seen.items()}
+
+    def keep_only(self, numbers: Collection[int]) -> None:
+        """Forget everybody else."""
+        self._seen = {number: last for number, last in self._seen.items() if number in numbers}
+
+
+def people_of_service(config: Config, homographies: Mapping[str, Floats | None]) -> PeopleOfService:
+    """Return how a site's services divide its people; `homographies` by camera, from its own picture."""
+    share = config.view.share
+    if not share.areas:
+        return PeopleByNumber(share)
+    return PeopleOfArea(share, ServiceArea(share, homographies, config.site.size), config.site.fps)
 
 
 def replacement_addresses(share: ShareSettings) -> list[str]:
@@ -33,6 +174,6 @@ def replacement_addresses(share: ShareSettings) -> list[str]:
     ]
 
 
-def shard_address(number: int, share: ShareSettings) -> str | None:
-    """Return the address of the first service of a number's share; None where the configuration has none."""
-    return share.servers[shard_of(number, share)].rstrip("/") + "/" if share.servers else None
+def share_address(number: int, share: ShareSettings) -> str | None:
+    """Return the address of the first service of a share; None where the configuration has none."""
+    return share.servers[number].rstrip("/") + "/" if share.servers else None

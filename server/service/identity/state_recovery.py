@@ -164,7 +164,7 @@ class StateRecovery:
         """Recover people whose tracks have reappeared, after the epoch that ends with a pulse."""
         if pulse > self._until:
             self._pending, self._has_ended = [], True
-            people.cancel_expected(self._tracks)
+            people.expected.cancel(self._tracks)
         self._pending = [person for person in self._pending if not self._restore(person, people, pulse)]
 
     def _restore(self, pending: _PendingPerson, people: PersonTracker, pulse: int) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 
 import msgspec
 
@@ -42,6 +42,7 @@ class StateReplication:
         fps: frames a second.
         send: sends a camera its snapshot.
         sends: returns whether this service sends snapshots; of several services one is enough.
+        send_to: the cameras to which it sends them; None: all.
         deleted: returns the numbers of the people whose data an earlier run has deleted, of the numbers that
             began at a time, unix seconds.
         clock: monotonic seconds.
@@ -55,11 +56,13 @@ class StateReplication:
         send: Callable[[str, bytes], None],
         *,
         sends: Callable[[], bool] = lambda: True,
+        send_to: Collection[str] | None = None,
         deleted: Callable[[float], Iterable[int]] = lambda _: (),
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._people, self._cameras, self._fps = people, cameras, fps
         self._send, self._sends, self._clock = send, sends, clock
+        self._send_to = cameras if send_to is None else send_to
         self._deleted = deleted
         self.forgotten: list[int] = []
         """Numbers of people whose data were deleted, in order."""
@@ -246,7 +249,7 @@ class StateReplication:
         recent = round(RECENT_S * self._fps)
         states = state_for_cameras(self._people, self._cameras, pulse, recent, self._since, self.forgotten)
         for camera, now in states.items():
-            if camera not in self._reported:
+            if camera not in self._reported or camera not in self._send_to:
                 continue
             before = self._sent.get(camera)
             if before is not None and pulse - before.pulse < _INTERVAL_S * self._fps and _same(before, now):

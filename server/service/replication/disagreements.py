@@ -30,6 +30,14 @@ class Disagreements:
     merged: Mapping[int, int] = field(default_factory=dict)
     split: Mapping[int, tuple[tuple[str, ...], int]] = field(default_factory=dict)
 
+    def common(self, other: Disagreements) -> Disagreements:
+        """Return what is the same in another comparison."""
+        return Disagreements(
+            dict(self.renumbered.items() & other.renumbered.items()),
+            dict(self.merged.items() & other.merged.items()),
+            dict(self.split.items() & other.split.items()),
+        )
+
     def __bool__(self) -> bool:
         """Return whether there are any."""
         return bool(self.renumbered or self.merged or self.split)

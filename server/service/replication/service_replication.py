@@ -1,10 +1,12 @@
 """Keeps the people's numbers of a site's best-view services equal, whichever of them dies or starts.
 
-All services compute the same identities from the same messages. Where they differ, since a message was lost
-or late to one of them, the others follow the leading service. Which one leads follows from the records alone:
-the one that has decided every epoch for longest. When its liveliness token is gone, or no record came for
-`LEASE_S`, the next one leads. A service that was stopped, or cut off from the cameras, has a later beginning
-when it returns, and so follows.
+Services of one share compute the same identities from the same messages. Where they differ, since a
+message was lost or late to one of them, the others follow the leading service. Which one leads follows from
+the records alone: the one that has decided every epoch for longest. When its liveliness token is gone, or no
+record came for `LEASE_S`, the next one leads. A service that was stopped, or cut off from the cameras, has a
+later beginning when it returns, and so follows.
+
+Where services divide a site by area, each sends its record after every epoch (`areas`).
 """
 
 from __future__ import annotations
@@ -32,6 +34,7 @@ from server.service.identity.people import PersonTracker
 from server.service.identity.state_recovery import RECENT_S, state_for_cameras
 from server.service.identity.state_replication import StateReplication
 from server.service.ingest.epoch_aligner import Epoch
+from server.service.replication.areas import AreaAgreement
 from server.service.replication.disagreements import (
     Disagreements,
     find_disagreements,
@@ -82,8 +85,11 @@ class ServiceReplication:
     ) -> None:
         share = config.view.share
         self._index, self._services = share.index, share.services
+        self._areas = AreaAgreement(share, people)
         self._cameras, self._fps = config.camera_ids, config.site.fps
-        self._interval = max(1, round(_INTERVAL_S * config.site.fps / config.window.stride))
+        self._interval = (
+            1 if share.areas else max(1, round(_INTERVAL_S * config.site.fps / config.window.stride))
+        )
         """Epochs between two records; those whose number it divides have one, in every service."""
         self._people, self._of_cameras, self._bus, self._clock = people, of_cameras, bus, clock
         self._received: dict[int, _Received] = {}
@@ -128,7 +134,11 @@ class ServiceReplication:
         except TimeoutError:
             log.info("%d of %d services are there", 1 + len(self._bus.other_services), self._services)
         answers = await asyncio.to_thread(self._bus.query_states, _STATE_S)
-        states = [state for answer in answers if (state := self._decode_state(answer)) is not None]
+        states = [
+            state
+            for answer in answers
+            if (state := self._decode_state(answer)) is not None and not self._areas.is_other(state.record)
+        ]
         if not states:
             return
         state = min(states, key=lambda state: state.record.rank)
@@ -156,6 +166,7 @@ class ServiceReplication:
             return
         if record.service < self._services and record.service != self._index:
             self._received[record.service] = _Received(record, self._clock())
+            self._areas.receive(record)
             for deletion in record.deletions:
                 self.follow_deletion(deletion)
 
@@ -199,23 +210,30 @@ class ServiceReplication:
         if (index := self._index if leader is None else leader.service) != self._leader:
             self._leader = index
             log.info("best-view service %d leads", index)
-        for received in self._live():
-            record = received.record
+        live = [received.record for received in self._live()]
+        for record in self._areas.step(self._own, live):
+            self._follow_numbering(record)
+            self.followed += 1
+        for record in live:
             own = self._own.get(record.pulse)
-            if own is None:
+            if own is None or self._areas.is_other(record):
                 continue
             del self._own[record.pulse]
             self._reserve(own, record)
             if record is leader:
-                if record.cameras:
-                    since = max(snapshot.numbered_since for snapshot in record.cameras.values())
-                    self._of_cameras.follow_numbering(since)
+                self._follow_numbering(record)
                 gone = set(self._of_cameras.forgotten)
                 self._follow(
                     find_disagreements(
                         snapshots_without(own.cameras, gone), snapshots_without(record.cameras, gone)
                     )
                 )
+
+    def _follow_numbering(self, record: ServiceRecord) -> None:
+        """Count the numbers from when those of another service began; between areas, from the latest."""
+        since = max((snapshot.numbered_since for snapshot in record.cameras.values()), default=0.0)
+        if since > (self._of_cameras.numbers_since if self._areas.is_other(record) else 0.0):
+            self._of_cameras.follow_numbering(since)
 
     def _follow(self, found: Disagreements) -> None:
         """Follow the leading service where two records in a row differ in the same way."""
@@ -239,7 +257,9 @@ class ServiceReplication:
     def _leading(self) -> ServiceRecord | None:
         """Return the record of the leading service; None: this one leads."""
         live = min(
-            (received.record for received in self._live()), key=lambda record: record.rank, default=None
+            (each.record for each in self._live() if not self._areas.is_other(each.record)),
+            key=lambda record: record.rank,
+            default=None,
         )
         if live is None:
             return None
@@ -272,6 +292,7 @@ class ServiceReplication:
             pulse=newest,
             unbroken_since=self._unbroken_since,
             cameras=snapshots,
+            in_area=self._areas.present(),
             deletions=self._deletions,
         )
 

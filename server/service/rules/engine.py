@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 import msgspec
 
@@ -57,6 +58,7 @@ class RuleEngine:
     def __init__(self, config: Config, letterboxes: Mapping[str, Letterbox]) -> None:
         self._letterboxes = letterboxes
         self._overhead = config.overhead
+        self._has_area = bool(config.view.share.areas)
         self.apply(config)
 
     def apply(self, config: Config) -> None:
@@ -103,6 +105,14 @@ class RuleEngine:
             usable,
         )
         cameras = {choice.number: choice.camera for choice in decision.choices}
+        if self._has_area:  # who is known here, but in another area, is for its service
+            decision = replace(
+                decision,
+                boxes={
+                    camera: [[box for box in frame if box[0] in cameras] for frame in frames]
+                    for camera, frames in decision.boxes.items()
+                },
+            )
         return [
             self._describe(event, names, cameras, pulse0)
             for frame in people_of_frames(decision, usable, self._letterboxes, self._overhead)

@@ -15,6 +15,7 @@ from server.config.site_config import Config
 from server.messaging.messages import NumberedBox
 from server.service.identity.occupied_regions import OccupiedRegions, Regions
 from server.service.identity.people import PersonTracker
+from server.service.identity.sharding import people_of_service
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.view_selection.current_shots import CurrentShots
 from server.service.view_selection.explanation import SelectionReasons
@@ -106,18 +107,18 @@ class ViewDecider:
         self._cameras: Sequence[str] = config.camera_ids
         self._has = has
         size = (config.site.width, config.site.height)
-        fps, share = config.site.fps, config.view.share
+        fps = config.site.fps
         self.people = PersonTracker(
             config.view.identity,
             self._cameras,
             camera_homographies,
             size,
             config.track.final_lag(fps),
-            share,
+            people_of_service(config, camera_homographies),
             config.overhead,
             fps,
             config.joint_cameras,
-            config.sites.ids,
+            config.person_numbers,
         )
         stride, gop = config.window.stride, config.gop
         self._occupied = (

@@ -22,6 +22,7 @@ from fakes.cli.command_line import RunCommand, input_error
 from fakes.media.videos import write_video
 from fakes.system.ports import free_port
 from fakes.timeouts import PATIENCE
+from server.config.loader import load_config
 from server.system.errors import UnavailableError
 from synthetic import Scene, scene_names
 
@@ -346,3 +347,19 @@ def test_help_does_not_import_modules_of_commands() -> None:
     command = [sys.executable, "-c", look]
     loaded = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True)
     assert loaded.stdout.split() == []
+
+
+def test_areas_proposes_a_setting_that_the_site_accepts(run: RunCommand, tmp_path: Path) -> None:
+    cameras = [{"id": f"c{k}", "source": f"scene:room?camera={k}&cameras=3&objects=2"} for k in range(3)]
+    result = run("areas", site(tmp_path, cameras=cameras), "--of", 2)
+    assert result.code == 0, result.err
+    proposed = yaml.safe_load(result.out)
+    assert [area["margin"] for area in proposed["view"]["share"]["areas"]] == [5.0, 5.0]
+    config = load_config(site(tmp_path, cameras=cameras, **proposed))
+    assert sorted({camera for area in config.view.share.areas for camera in area.cameras}) == [
+        "c0",
+        "c1",
+        "c2",
+    ]
+    few = run("areas", site(tmp_path, cameras=cameras), "--of", 4)
+    assert "4 areas need as many calibrated cameras at least, but there are 3" in input_error(few)

@@ -11,7 +11,7 @@ from fakes.service.decisions import choice, collect_decisions, decision, service
 from fakes.service.scripted_cameras import CAMERAS, GOP, HEIGHT, SMALL, WIDTH
 from fakes.system.full_disk import files_of_at_most
 from server.media.letterbox import Letterbox
-from server.service.decision_files.live_decision_writer import LiveDecisionWriter
+from server.service.decision_files.live_decision_writer import LiveDecisionWriter, open_decision_files
 
 A, B = CAMERAS
 LETTERBOXES = dict.fromkeys(CAMERAS, Letterbox((WIDTH, HEIGHT), (WIDTH, HEIGHT)))
@@ -68,7 +68,9 @@ def test_a_full_disk_at_the_end_is_logged_and_all_files_are_intact(
 async def test_a_service_decides_and_closes_despite_a_full_disk(tmp_path: Path) -> None:
     service = service_with_backlog()
     decided = collect_decisions(service)
-    service.decision_writer = service.loss_recorder.decision_writer = service._open_decision_files(tmp_path)
+    service.decision_writer = service.loss_recorder.decision_writer = open_decision_files(
+        tmp_path, CAMERAS, service.decider.people.letterboxes
+    )
     with files_of_at_most(0):
         service.decide()
         service.close()

@@ -22,6 +22,7 @@ from fakes.service.scripted_recordings import playable_files
 from server.media.audio.aac import SAMPLES
 from server.media.audio.audio_format import AudioFormat
 from server.messaging.epochs import end_of_epoch
+from server.service.decision_files.live_decision_writer import open_decision_files
 from server.service.streaming.audio_buffer import AudioBuffer, AudioFollower
 from server.service.streaming.media_chunk import MediaChunk
 
@@ -42,7 +43,9 @@ def run_epochs(service: FedService, epochs: range) -> None:
 def service(tmp_path: Path) -> FedService:
     """A service that records and writes decisions."""
     service = FedService(small_config(record={"folder": str(tmp_path / "kept")}), out=tmp_path)
-    service.decision_writer = service.loss_recorder.decision_writer = service._open_decision_files(tmp_path)
+    service.decision_writer = service.loss_recorder.decision_writer = open_decision_files(
+        tmp_path, CAMERAS, service.decider.people.letterboxes
+    )
     service.recorder.open()
     service.connect_cameras(*CAMERAS)
     return service

@@ -1,0 +1,188 @@
+"""Who is in a service's area is decided for there; who is far from it is not taken in."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from typing import Any
+
+import aiohttp
+import msgspec
+import numpy as np
+import pytest
+
+from fakes.service.scripted_cameras import CAMERAS, SMALL, FedService, camera_tracks, epoch_of, small_config
+from server.config.sections import HttpSettings, ShareSettings
+from server.config.site_config import Config
+from server.http.app import make_app, serving
+from server.messaging.messages import CameraTracks
+from server.messaging.observations import FrameObservations, unpack_observations
+from server.messaging.packed_arrays import pack_detections, pack_histograms
+from server.service.identity.service_area import ServiceArea, area_to_take_in
+from server.service.identity.sharding import PeopleOfArea, TracksOfPeople
+from server.service.service import BestViewService
+from server.system.errors import UserError
+
+SIZE = (640, 360)
+WEST, EAST = (0.0, 0.0, 100.0, 400.0), (100.0, 0.0, 640.0, 400.0)
+GROUND = np.eye(3)
+"""Pixels of the picture are the floor's unit."""
+
+
+def share(index: int, *, floor: bool = True) -> ShareSettings:
+    """Return two areas, in the west and in the east; c0 looks at the west, and both cameras see both."""
+    return ShareSettings.model_validate(
+        {
+            "of": 2,
+            "index": index,
+            "servers": ["http://west:1/", "http://east:1/"],
+            "areas": [
+                {"cameras": ["c0"], "also": ["c1"], "floor": WEST if floor else None, "margin": 20.0},
+                {"cameras": ["c1"], "also": ["c0"], "floor": EAST if floor else None, "margin": 20.0},
+            ],
+        }
+    )
+
+
+def at(x: float) -> tuple[float, float, float, float]:
+    """Return the box of a person whose feet are at (x, 200)."""
+    return (x - 10.0, 140.0, x + 10.0, 200.0)
+
+
+def seen(camera: str, epoch: int, *places: float) -> CameraTracks:
+    """Return a camera's message about people at these places, as tracks from 1 on."""
+    message = camera_tracks(camera, epoch, {track: at(x) for track, x in enumerate(places, 1)})
+    return msgspec.structs.replace(message, size=SIZE)
+
+
+def test_people_beyond_the_margin_are_not_taken_in() -> None:
+    area = ServiceArea(share(0), dict.fromkeys(CAMERAS, GROUND), SIZE)
+    found = FrameObservations(
+        pulse=0,
+        boxes=pack_detections(np.array([at(50), at(119), at(300)]), np.array([0.5, 0.6, 0.7])),
+        histograms=pack_histograms(np.eye(3)),
+    )
+    message = msgspec.structs.replace(seen("c0", 0, 50.0, 119.0, 121.0, 300.0), observations=[found])
+    near = area.near(epoch_of(0, message)).tracks["c0"]
+    assert [track.id for track in near.tracks] == [1, 2]
+    kept = unpack_observations(near.observations[0])
+    assert kept.scores == pytest.approx([0.5, 0.6], abs=1e-6)
+    assert kept.histograms.argmax(axis=1).tolist() == [0, 1]
+
+
+def test_hidden_people_and_those_of_uncalibrated_cameras_are_taken_in() -> None:
+    area = ServiceArea(share(0), {"c0": GROUND, "c1": None}, SIZE)
+    hidden = camera_tracks("c0", 0, {1: None})
+    assert len(area.near(epoch_of(0, hidden)).tracks["c0"].tracks) == 1
+    assert len(area.near(epoch_of(0, seen("c1", 0, 600.0))).tracks["c1"].tracks) == 1
+
+
+@pytest.mark.parametrize("floor", [True, False])
+def test_who_walks_into_another_area_is_in_both_and_then_there(floor: bool) -> None:
+    west, east = (
+        PeopleOfArea(
+            share(index, floor=floor), ServiceArea(share(index), dict.fromkeys(CAMERAS, GROUND), SIZE), 25.0
+        )
+        for index in (0, 1)
+    )
+
+    def step(frame: int, x: float) -> tuple[list[int], list[int]]:
+        tracks = [TracksOfPeople(seen(camera, 0, x), [7]) for camera in CAMERAS]
+        for area, other in ((west, 1), (east, 0)):
+            area.update(tracks, frame)
+            area.hear(dict.fromkeys((east if other else west).present, other))
+        return west.own([7], {}), east.own([7], {})
+
+    assert step(0, 50.0) == ([7], [])
+    assert (west.share_of(7), east.share_of(7)) == (0, 0)
+    assert step(5, 150.0) == ([7], [7])
+    assert step(50, 150.0) == ([7], [7])
+    assert step(60, 150.0) == ([], [7])
+    assert west.others([7], {}) == [7]
+    assert (west.share_of(7), east.share_of(7)) == (1, 1)
+
+
+def test_nobody_leaves_an_area_before_another_has_them() -> None:
+    area = PeopleOfArea(share(0), ServiceArea(share(0), dict.fromkeys(CAMERAS, GROUND), SIZE), 25.0)
+    area.update([TracksOfPeople(seen("c0", 0, 50.0), [3])], 0)
+    area.update([TracksOfPeople(seen("c0", 0, 110.0), [3])], 500)
+    assert area.own([3], {}) == [3]
+    area.renumber({3: 8})
+    assert area.own([3, 8], {}) == [8]
+    area.keep_only([])
+    assert area.own([8], {}) == []
+
+
+def config_of_areas(index: int, **more: Any) -> Config:
+    """Return the configuration of one of two services, each of which takes in one camera."""
+    areas = [{"cameras": ["c0"]}, {"cameras": ["c1"]}]
+    return small_config(view={"share": {"of": 2, "index": index, "areas": areas, **more}})
+
+
+def test_a_service_takes_in_the_cameras_zones_and_rules_of_its_area() -> None:
+    square = [[0, 0], [9, 0], [9, 9]]
+    content = {
+        "view": {"share": {"of": 2, "areas": [{"cameras": ["c0"]}, {"cameras": ["c1"]}]}},
+        "zones": [
+            {"id": "here", "camera": "c0", "area": square},
+            {"id": "there", "camera": "c1", "area": square},
+        ],
+        "rules": [{"id": zone, "kind": "entered", "zone": zone} for zone in ("here", "there")],
+    }
+    own = small_config(**content).of_service()
+    assert own.camera_ids == ("c0",)
+    assert own.site_camera_ids == CAMERAS
+    assert [zone.id for zone in own.zones] == [rule.id for rule in own.rules] == ["here"]
+    assert own.of_service() is own
+    assert (own.person_numbers.index, own.person_numbers.step) == (0, 2)
+    assert area_to_take_in(own, {}) is None
+    assert small_config().of_service().camera_ids == CAMERAS
+
+
+@pytest.mark.parametrize(
+    ("of", "areas", "reason"),
+    [
+        (2, [{"cameras": ["c0", "c1"]}], "areas: has 1, but there are 2 shares"),
+        (2, [{"cameras": ["c0"]}, {"cameras": ["c0"]}], "areas: camera c0 is in two"),
+        (1, [{"cameras": ["c0"]}], "camera c1 is in none"),
+        (2, [{"cameras": ["c0"]}, {"cameras": ["c1", "c9"]}], "there is no camera 'c9'; there are c0, c1"),
+        (
+            2,
+            [{"cameras": ["c0"]}, {"cameras": ["c1"], "also": ["c1"]}],
+            "'c1' is not a camera of another area",
+        ),
+        (1, [{"cameras": ["c0", "c1"], "floor": [0, 0, 0, 5]}], "is no rectangle"),
+    ],
+)
+def test_areas_that_do_not_fit_are_refused(of: int, areas: list[dict[str, Any]], reason: str) -> None:
+    with pytest.raises(UserError, match=reason):
+        small_config(view={"share": {"of": of, "areas": areas}})
+
+
+@pytest.fixture
+async def west_service() -> AsyncIterator[str]:
+    """Serve the first of two areas."""
+    servers = ["http://west:1/", "http://east:1/"]
+    service = FedService(config_of_areas(0, servers=servers).of_service())
+    service.connect_cameras("c0")
+    for epoch in range(4):
+        service.feed(epoch, {"c0": {1: SMALL}})
+    area = service.decider.people.of_service
+    assert isinstance(area, PeopleOfArea)
+    area.hear({2: 1})
+    async with serving(make_app(BestViewService(service)), HttpSettings(port=0)) as port:
+        yield f"http://127.0.0.1:{port}"
+    service.close()
+
+
+async def test_live_requests_for_another_area_are_redirected(west_service: str) -> None:
+    async with aiohttp.ClientSession() as session:
+
+        async def get(path: str) -> tuple[int, str | None]:
+            async with session.get(west_service + path, allow_redirects=False) as answer:
+                return answer.status, answer.headers.get("Location")
+
+        for path in ("objects/2/best.mp4?a=b", "cameras/c1/live.jpg"):
+            assert await get(f"/{path}") == (307, f"http://east:1/{path}")
+        assert (await get("/objects/2/hls/7.m4s"))[0] == 404  # the past of another area is not here
+        assert (await get("/cameras/c9/live.jpg"))[0] == 404
+        assert (await get("/api/objects/1/choice"))[0] == 200
