@@ -154,6 +154,10 @@ def read_site(path: Path, urls: list[str], services: int | None) -> ContainerSit
         _move_secret(content, place, path.parent, secret_files)
     for number, webhook in enumerate(content.get("webhooks", [])):
         _move_secret(webhook, ("secret",), path.parent, secret_files, ("webhooks", str(number)))
+    for name, link in config.sites.link.items():
+        for key in link.model_fields_set & {"users", "authority"}:
+            section = content["sites"]["link"][name]
+            _move_secret(section, (key,), path.parent, secret_files, ("sites", "link", name))
     texts = _move_ground(content, path.parent)
     moved = _move_files(content, config, path.parent)
     is_private = bool(config.webhooks) or any(camera.options for camera in config.cameras)
@@ -165,6 +169,11 @@ def read_site(path: Path, urls: list[str], services: int | None) -> ContainerSit
         raise UserError(
             f"{count} best-view services, view.share.of {share.of}, {len(urls)} --url: there must be a "
             "multiple of the shares, and an address for each service, or, without shares, one for all"
+        )
+    if config.sites.link and not site.is_open:
+        raise UserError(
+            "sites.link: in a cluster a site without tokens is open to all, and would tell viewers of other "
+            "sites who is there: set access.tokens to a file of tokens, or access.open_to_all: true"
         )
     if urls and not site.is_open:
         raise UserError(

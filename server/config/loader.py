@@ -20,6 +20,7 @@ from server.config.ground_unit import check_unit_spelling
 from server.config.sections import (
     CameraSettings,
     ProcessTlsSettings,
+    SitesSettings,
     SyncSettings,
     TlsSettings,
     ViewSettings,
@@ -118,7 +119,17 @@ def _resolved_access(config: Config, folder: Path) -> dict[str, Any]:
         "rtsp": rtsp,
         "sync": _process_files(config.sync, folder),
         "zenoh": _process_files(config.zenoh, folder),
+        "sites": _resolved_sites(config.sites, folder),
     }
+
+
+def _resolved_sites(sites: SitesSettings, folder: Path) -> SitesSettings:
+    links = {}
+    for name, link in sites.link.items():
+        files = {"users": link.users, "authority": link.authority}
+        update = {key: (folder / path).absolute() for key, path in files.items() if path is not None}
+        links[name] = link.model_copy(update=update)
+    return sites.model_copy(update={"link": links})
 
 
 def _resolved_tls(tls: TlsSettings, folder: Path) -> TlsSettings:

@@ -311,6 +311,21 @@ def test_each_process_gets_its_own_secrets_alone(tmp_path: Path) -> None:
     assert f"A:{SECRET}of-A" in values["sync"]["sync.users"]
 
 
+def test_files_of_other_sites_are_secrets_of_the_best_view(tmp_path: Path) -> None:
+    link = {"connect": "tls/yard:7447", "url": "https://yard/", "users": "users", "authority": "file.pem"}
+    linked = {"of": 2, "link": {"yard": link}}
+    path = site_with(tmp_path, sites=linked, access={"tokens": "tokens.yaml"})
+    manifests, secrets = render(path), render_secrets(path)
+    check_manifests(manifests, secrets)
+    assert {"sites.link.yard.users", "sites.link.yard.authority"} <= set(
+        of_kind(secrets, "Secret")["bestview"]["data"]
+    )
+    config = loaded_in_containers(manifests, secrets)
+    assert str(config.sites.link["yard"].users).endswith("/sites.link.yard.users")
+    with pytest.raises(UserError, match=r"^sites\.link: in a cluster a site without tokens"):
+        render(site_with(tmp_path, sites=linked))
+
+
 def test_without_tokens_only_the_namespace_reaches_the_page(tmp_path: Path) -> None:
     closed = of_kind(render(site_with(tmp_path)), "NetworkPolicy")
     assert list(closed) == ["site"]
