@@ -1,4 +1,4 @@
-"""What a site tells other sites once a second: who is there, who has left, how they look, who was deleted.
+"""What a site tells other sites twice a second: who is there, who has left, how they look, who was deleted.
 
 Only what has changed is sent at once; the rest is repeated in turn, so that a site that was cut off or has
 just started knows all of it within seconds, and a message is never longer than `MESSAGE_BYTES_MAX`. Times are

@@ -1,6 +1,6 @@
 """Other sites: people who walk from one into another keep their number.
 
-Once a second the leading service of a site tells the others whom it sees or has seen last (`site_people`),
+Twice a second the leading service of a site tells the others whom it sees or has seen last (`site_people`),
 and takes in what they say: who has left there counts as lost here, and is matched with who arrives, by looks
 and by how long people take between cameras of the two (`bestview.association.registry`). Each site assigns
 every *n*-th number, so no two people have the same. If two sites still say that they see one person, the one
@@ -53,7 +53,7 @@ from server.service.replication.service_replication import ServiceReplication
 
 log = logging.getLogger(__name__)
 
-_INTERVAL_S = 1.0
+_INTERVAL_S = 0.5
 _STAY_MARGIN_S = 2.0
 """Seconds by which two sites' times of arrival may be wrong."""
 _CONFLICTS = 2

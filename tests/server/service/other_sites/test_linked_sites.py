@@ -43,6 +43,13 @@ async def test_who_walks_from_one_site_into_another_keeps_their_number(sites: Li
     assert sites.elsewhere("yard") == {4: "hall"}
 
 
+async def test_a_second_between_two_sites_is_enough(sites: LinkedSites) -> None:
+    sites.walk(5, hall={A: SMALL})
+    sites.walk(1)
+    sites.walk(3, yard={A: SMALL})
+    assert sites.number("yard", A) == 1
+
+
 async def test_a_site_that_has_just_started_knows_who_left_another_before() -> None:
     with linked_sites("hall") as sites:
         sites.walk(6, hall={A: SMALL})
