@@ -50,8 +50,18 @@ _LEFT = """async () => {
   const { objects } = await (await fetch('api/objects')).json();
   return objects.filter((it) => !it.visible && it.thumbnail).map((it) => it.object);
 }"""
-_SECTIONS = ("cameras", "floor", "known", "zones", "ignored-areas", "calibration", "view-selection")
-"""Sections of the operator's page."""
+_SECTIONS = {
+    "cameras": "",
+    "site": "#site-cameras",
+    "floor": "",
+    "people": "",
+    "zones": "",
+    "ignored-areas": "",
+    "calibration": "",
+    "calibration-points": "",
+    "view-selection": "",
+}
+"""Sections of the operator's page, and what is at the top of the screen, if not the section's beginning."""
 _MEASURED_MS = 8_000
 """Milliseconds until a section has its pictures and measurements."""
 _PLAYS = "myview.state === 'playing' && myview.camera !== null"
@@ -69,10 +79,11 @@ class ScreenshotSession:
     page: Page
     out: Path
 
-    async def shoot(self, state: str, prepare: Prepare, until: str = _PLAYS) -> None:
+    async def shoot(self, state: str, prepare: Prepare, until: str = _PLAYS, top: str = "body") -> None:
         """Take screenshots of a state in all widths, each when a JavaScript expression holds.
 
-        People come and go meanwhile: a state that is not reached is prepared again.
+        The screen begins at the element ``top``, a selector. People come and go meanwhile: a state that is
+        not reached is prepared again.
 
         Raises:
             RuntimeError: the state is not reached in time.
@@ -82,7 +93,8 @@ class ScreenshotSession:
             for _ in range(_TRIES):
                 await prepare()
                 await self.page.mouse.move(0, 0)  # so that nothing is highlighted below the pointer
-                await self.page.evaluate("document.activeElement.blur(), scrollTo(0, 0)")
+                await self.page.evaluate("document.activeElement.blur()")
+                await self.page.evaluate(f"document.querySelector('{top}').scrollIntoView()")
                 await asyncio.sleep(_SETTLED_S)
                 with contextlib.suppress(LateError):
                     await self.page.wait_for_function(until, timeout=_PATIENCE_MS)
@@ -123,11 +135,12 @@ async def take_operating(out: Path, fps: float) -> None:
     async with chromium() as browser, demo_at(fps) as url:
         async with _sitting(browser, url, out) as sitting:
             await sitting.page.wait_for_function(_PLAYS, timeout=_LONG_MS)
-        for section in _SECTIONS:
+        for state, top in _SECTIONS.items():
+            section = "cameras" if top else state
             async with _sitting(browser, f"{url}operator#{section}", out) as sitting:
                 await sitting.page.wait_for_timeout(_MEASURED_MS)
                 there = f"document.querySelector('#{section}').hidden === false"
-                await sitting.shoot(f"operator-{section}", sitting.as_it_is, there)
+                await sitting.shoot(f"operator-{state}", sitting.as_it_is, there, top or "body")
 
 
 async def take_watching(out: Path, fps: float) -> None:

@@ -11,6 +11,7 @@ from aiohttp import web
 from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import SETUP
 from server.http.json_responses import error_response, json_response, read_json
+from server.http.operator.schema import OfferedStream, OfferedStreams, SearchedCamera, SearchResult
 from server.setup.camera_address import CameraAddresses, parse_addresses
 from server.setup.onvif_profiles import INSTALL, is_installed
 from server.setup.session import SetupSession
@@ -24,23 +25,6 @@ Login = Annotated[str, msgspec.Meta(max_length=200)]
 Name = Annotated[str, msgspec.Meta(max_length=100)]
 
 
-class SearchedCamera(msgspec.Struct, frozen=True):
-    """A camera that answered the search."""
-
-    host: str
-    port: int
-    name: str
-    hardware: str
-
-
-class SearchResult(msgspec.Struct, frozen=True):
-    """The cameras of the network."""
-
-    cameras: list[SearchedCamera]
-    hint: str
-    """Why their streams cannot be asked for; empty: they can."""
-
-
 class StreamsQuery(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A found camera whose streams are asked for."""
 
@@ -48,29 +32,6 @@ class StreamsQuery(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     port: Annotated[int, msgspec.Meta(ge=1, le=65_535)]
     user: Login = ""
     password: Login = ""
-
-
-class OfferedStream(msgspec.Struct, frozen=True):
-    """A stream that a camera offers."""
-
-    key: int
-    name: str
-    codec: str
-    width: int
-    height: int
-    fps: float
-
-
-class OfferedStreams(msgspec.Struct, frozen=True):
-    """The streams of a camera, the largest first."""
-
-    error: str
-    needs_password: bool
-    streams: list[OfferedStream]
-    source: int | None = None
-    """Key of the stream that is proposed for viewers."""
-    substream: int | None = None
-    """Key of the stream that is proposed for tracking; null: the same."""
 
 
 class CameraTrial(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

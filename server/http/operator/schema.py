@@ -69,6 +69,46 @@ class SiteCameras(msgspec.Struct, frozen=True):
     cameras: list[SiteCamera]
 
 
+class SearchedCamera(msgspec.Struct, frozen=True):
+    """A camera that answered the search."""
+
+    host: str
+    port: int
+    name: str
+    hardware: str
+
+
+class SearchResult(msgspec.Struct, frozen=True):
+    """The cameras of the network."""
+
+    cameras: list[SearchedCamera]
+    hint: str
+    """Why their streams cannot be asked for; empty: they can."""
+
+
+class OfferedStream(msgspec.Struct, frozen=True):
+    """A stream that a camera offers."""
+
+    key: int
+    name: str
+    codec: str
+    width: int
+    height: int
+    fps: float
+
+
+class OfferedStreams(msgspec.Struct, frozen=True):
+    """The streams of a camera, the largest first."""
+
+    error: str
+    needs_password: bool
+    streams: list[OfferedStream]
+    source: int | None = None
+    """Key of the stream that is proposed for viewers."""
+    substream: int | None = None
+    """Key of the stream that is proposed for tracking; null: the same."""
+
+
 class SiteFormat(msgspec.Struct, frozen=True):
     """Settings of the site in the configuration file, which may differ from those in force."""
 
@@ -231,12 +271,14 @@ OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/position_corrections": CorrectionStatus,
     "/api/operator/config": Settings,
     "/api/operator/restart": RestartStatus,
+    "/api/operator/setup/search": SearchResult,
+    "/api/operator/setup/streams": OfferedStreams,
     "/api/operator/site_cameras": SiteCameras,
     "/api/operator/site_settings": SiteFormat,
     "/api/operator/view_selection": SelectionSettings,
     "/api/operator/zones": SiteZones,
 }
-"""The answer to GET of each path; POST, PUT and DELETE answer with the new state."""
+"""The answer to GET of each path; POST, PUT and DELETE answer with the new state. Set-up has POST alone."""
 
 OPERATOR_FILES = {"/api/operator/tracks.csv": "text/csv", "/api/operator/choices.csv": "text/csv"}
 """Downloads of a time range, given by from= and to=."""

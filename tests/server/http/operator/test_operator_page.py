@@ -556,7 +556,7 @@ async def test_the_configuration_shows_differences_and_can_be_searched(browser: 
 
 async def test_no_width_overflows_and_axe_finds_no_serious_violation(browser: Browser) -> None:
     axe = AXE.read_text(encoding="utf-8") if AXE.exists() else ""
-    async with open_operator_page(browser, axe=axe) as (served, page):
+    async with open_operator_page(browser, axe=axe, patience=PATIENCE) as (served, page):
         show_people(served)
         for width in (360, 800, 1600):
             await page.set_viewport_size({"width": width, "height": 800})
