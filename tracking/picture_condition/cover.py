@@ -109,12 +109,9 @@ class CoverFinder:
         self._take(found, evidence)
 
     def _take(self, found: Cells, evidence: _Evidence) -> None:
-        if not found.any():
-            self.cells, self.rest_is_seen = None, True
-            return
         # At its edge the cover hides a part of the cells.
-        self.cells = _grown(found)
-        rest = evidence.noticed & ~self.cells
+        self.cells = _grown(found) if found.any() else None
+        rest = evidence.noticed if self.cells is None else evidence.noticed & ~self.cells
         shown = np.count_nonzero(evidence.seen & rest)
         self.rest_is_seen = bool(shown >= max(_REST_SEEN * np.count_nonzero(rest), _LIGHT_CELLS))
 
@@ -126,7 +123,7 @@ class CoverFinder:
         return np.asarray(cv2.resize(cells.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0)
 
 
-_LEAST_PRODUCT = 1e-6
+_LEAST_EDGES = 1e-4
 
 
 def _evidence(structure: Structure, reference: Structure, noise: float) -> _Evidence | None:
@@ -135,7 +132,8 @@ def _evidence(structure: Structure, reference: Structure, noise: float) -> _Evid
     raw = cell_means(structure.across**2 + structure.down**2, _CELLS)
     product = cell_means(structure.across * reference.across + structure.down * reference.down, _CELLS)
     textured = expected > _EDGE
-    seen = textured & (product >= _SEEN * np.sqrt(expected * raw))
+    # Where a drawn picture has no edges and no noise either, nothing agrees.
+    seen = textured & (product > _SEEN * np.sqrt(expected * np.maximum(raw, _LEAST_EDGES * expected)))
     if np.count_nonzero(seen) < _LIGHT_CELLS:
         return None
     edges = np.maximum(raw - noise, 0.0)

@@ -58,7 +58,7 @@ class PictureMonitor:
     def shows_now(self) -> bool:
         """Whether what is seen is what happens now, in a part of the picture at least."""
         if self.condition == "covered":
-            return self._cover.cells is not None and self._cover.rest_is_seen
+            return self._cover.rest_is_seen
         return not self._stillness.repeats
 
     @property

@@ -65,7 +65,8 @@ class CrossViewScorer:
             found = calibrated_detections(most_confident(detections), self._letterbox, motion)
             boxes = pack_detections(found.boxes, found.scores)
             if covered is not None:
-                hidden = pack_boxes(calibrated_camera_boxes(covered, self._letterbox, motion))
+                rectangles = calibrated_camera_boxes(covered, self._letterbox, motion)
+                hidden = pack_boxes(rectangles[np.isfinite(rectangles).all(axis=1)])
         return FrameDetections(
             camera=self._camera,
             boot=self._boot,

@@ -17,6 +17,7 @@ from server.camera.sources import Image, SourceEndedError
 from server.camera.substream.picture_scale import PictureScale
 from server.cli.render.camera_workers import run_camera
 from server.config.loader import build_config
+from tracking.boxes import areas
 from tracking.detectors import BackgroundDetector, Detector, HogDetector
 from tracking.detectors.background.motion import STILL, Motion
 
@@ -135,6 +136,28 @@ def test_a_camera_that_is_turned_away_shows_its_place_only_once_it_is_located(
     monkeypatch.setattr(view.monitor, "shows_another_scene", True)
     view.observe(picture, 1)
     assert not view.shows_its_place
+
+
+def test_a_camera_whose_lens_is_covered_in_part_shows_its_place_in_the_rest() -> None:
+    room, random = KnockedCamera().take(0), np.random.default_rng(0)
+    detector = BackgroundDetector()
+    view = ShownView(10.0, detector, SCALE)
+    shares = []
+    for frame in range(90):
+        picture = np.clip(room + 2.0 * random.standard_normal(room.shape), 0, 255).astype(np.uint8)
+        if 50 <= frame < 80:
+            picture[:, : SIZE[0] // 2] = (40, 60, 150)
+            edge = slice(SIZE[0] // 2 - 10, SIZE[0] // 2 + 10)
+            picture[:, edge] = cv2.blur(picture, (21, 1))[:, edge]
+        detector.detect(picture)
+        view.observe(picture, frame)
+        shares.append(areas(view.hidden).sum() / (SIZE[0] * SIZE[1]))
+        assert view.shows_its_place
+        if frame == 75:
+            ignored = 1.0 - np.count_nonzero(detector.grid.visible) / detector.grid.visible.size
+            assert ignored == pytest.approx(0.5, abs=0.1)
+    assert shares[75] == pytest.approx(0.5, abs=0.1)
+    assert shares[49] == shares[-1] == 0.0
 
 
 def test_a_view_that_is_lost_for_long_without_a_turn_lies_where_it_lay() -> None:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from server.messaging.messages import Box
 from server.messaging.packed_arrays import (
     are_boxes,
+    check_areas,
     first_boxes,
     histogram_bins,
     last_box,
@@ -45,6 +46,15 @@ def test_coordinates_are_limited_and_boxes_hidden_as_a_whole() -> None:
 @pytest.mark.parametrize("row", [(0, 0, np.inf, 1), (0, 0, 2e6, 1), (0, np.nan, 1, 1)])
 def test_other_numbers_are_no_boxes(row: tuple[float, ...]) -> None:
     assert not are_boxes([np.array(row, dtype="<f4").tobytes()], 1)
+
+
+@pytest.mark.parametrize(
+    "packed", [b"x" * 15, pack_boxes([None]), np.array([0, 0, 2e6, 1], dtype="<f4").tobytes()]
+)
+def test_what_is_covered_has_whole_rectangles(packed: bytes) -> None:
+    check_areas(pack_boxes([(0.0, 0.0, 20.0, 10.0), (0.0, 10.0, 5.0, 20.0)]))
+    with pytest.raises(ValueError, match="rectangles"):
+        check_areas(packed)
 
 
 @given(st.integers(1, 5), st.integers(1, 96), st.integers(0, 99))

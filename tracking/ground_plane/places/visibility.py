@@ -16,6 +16,7 @@ _FREE_SHARE, _HIDDEN_SHARE = 0.3, 0.9
 _HIDDEN_FACTOR = 0.15
 _UNCOVERED, _COVERED = 0.2, 0.7
 """Shares of a box behind a cover up to which the person is detected as elsewhere, and from which never."""
+_PIXEL = 1.0
 _NEARER = 0.02
 """Box heights by which a foot must be lower to be of somebody nearer to the camera."""
 _MAX_CUT = 0.7
@@ -41,7 +42,9 @@ def detection_probabilities(
             continue
         points = camera.to_image(places)
         if not size.known:
-            found[:, index] = probability * camera.contains(points)
+            at_feet = np.concatenate([points - _PIXEL / 2.0, points + _PIXEL / 2.0], axis=1)
+            shown = camera.contains(points) * (1.0 - camera.covered_shares(at_feet))
+            found[:, index] = probability * shown
             continue
         boxes = size.boxes(points)
         of_camera = measurements.camera == index

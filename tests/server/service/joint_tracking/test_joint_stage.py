@@ -8,7 +8,15 @@ import pytest
 
 from fakes.service.joint_floor import SIZE, STRIDE, VIEWS, joint_config, walk_past, walked_epochs
 from fakes.tracking.walked_floor import FloorNoise
-from server.messaging.packed_arrays import are_boxes, unpack_boxes, unpack_histograms
+from server.messaging.observations import FrameObservations
+from server.messaging.packed_arrays import (
+    are_boxes,
+    pack_boxes,
+    pack_detections,
+    unpack_boxes,
+    unpack_detections,
+    unpack_histograms,
+)
 from server.messaging.picture_motion import picture_motion
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.joint_tracking.stage import JointStage
@@ -99,6 +107,28 @@ def test_a_camera_that_was_knocked_shows_boxes_where_its_picture_is_now() -> Non
     for track in message.tracks:
         box = unpack_boxes([track.boxes])[0] - np.tile([12.0, -7.0], 2)
         assert max(iou(box, VIEWS["c0"].box(place)) for place in walks[message.first]) > 0.8
+
+
+@pytest.mark.parametrize("is_known", [False, True])
+def test_cameras_that_are_covered_say_nothing_against_people_whom_others_see(*, is_known: bool) -> None:
+    whole = pack_boxes([(0.0, 0.0, float(SIZE[0]), float(SIZE[1]))])
+    epochs = []
+    for epoch in walked_epochs(walk_past()):
+        messages = dict(epoch.tracks)
+        doubted = [
+            msgspec.structs.replace(frame, boxes=pack_detections(boxes, np.full(len(boxes), 0.3)))
+            for frame in messages["c0"].observations
+            for boxes in [unpack_detections(frame.boxes)[0]]
+        ]
+        messages["c0"] = msgspec.structs.replace(messages["c0"], observations=doubted)
+        for name in ("c1", "c2"):
+            nobody = [FrameObservations(pulse=frame.pulse) for frame in messages[name].observations]
+            messages[name] = msgspec.structs.replace(
+                messages[name], observations=nobody, covered=whole if is_known else b""
+            )
+        epochs.append(Epoch(epoch.number, epoch.last, messages))
+    found = tracked(epochs)[15].tracks["c0"].tracks
+    assert (len(found) == 2) is is_known
 
 
 def test_looks_go_with_the_tracks() -> None:
