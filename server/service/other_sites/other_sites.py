@@ -151,7 +151,10 @@ class OtherSites:
             return
         site.heard_at = now = self._clock()
         own_since = self._of_cameras.numbers_since
-        if site.numbered_since not in {None, told.numbered_since}:
+        renumbered = site.has_renumbered(told.numbered_since)
+        if renumbered is None:
+            return
+        if renumbered:
             self._renumbered(told.index)
         site.index, site.numbered_since = told.index, told.numbered_since
         site.viewers = told.viewers or site.viewers

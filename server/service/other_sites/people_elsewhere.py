@@ -27,6 +27,8 @@ HEARD_S = 5.0
 """Seconds after its last message for which a site counts as there."""
 SILENT_S = 30.0
 """Seconds after its last message after which those whom it saw count as having left."""
+_RENUMBERED = 3
+"""Messages in a row after which a site's numbers have begun anew."""
 _REPEATED_S = 60.0
 """Seconds after which a site that is there has repeated everybody whom it has not forgotten."""
 
@@ -71,6 +73,19 @@ class LinkedSite:
     """Why its messages are not used; empty: they are."""
     viewers: Viewers = field(default_factory=Viewers)
     population: NDArray[np.float64] | None = None
+    _begins_anew: int = 0
+    """Messages in a row in which its numbers began at another time."""
+
+    def has_renumbered(self, since: float) -> bool | None:
+        """Return whether a site's numbers have begun anew; None: only if it says so several times in a row.
+
+        For a moment two of a site's services may both lead, one of which has just started.
+        """
+        if self.numbered_since in {None, since}:
+            self._begins_anew = 0
+            return False
+        self._begins_anew += 1
+        return True if self._begins_anew >= _RENUMBERED else None
 
     def is_there(self, now: float, within: float = HEARD_S) -> bool:
         """Return whether it has been heard lately, and is not refused."""

@@ -9,7 +9,8 @@ import msgspec
 import pytest
 
 from fakes.service.linked_sites import LinkedSites, linked_sites
-from fakes.service.scripted_cameras import LARGE, SMALL
+from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL, STRIDE, FedService, camera_tracks, tracks
+from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import ZenohKeys
 from server.messaging.site_people import (
@@ -19,9 +20,11 @@ from server.messaging.site_people import (
     pack_sightings,
     unpack_sightings,
 )
+from server.service.identity.state_recovery import state_for_cameras
 from server.service.other_sites.people_elsewhere import HEARD_S, SILENT_S
 
 A, B = 1, 4
+KEYS = ZenohKeys("yard")
 """Tracks, whose looks are as their numbers."""
 
 
@@ -167,10 +170,48 @@ async def test_a_site_whose_numbers_begin_anew_uses_none_that_somebody_still_has
     sites.stop("hall")
     sites.walk(2, yard={A: SMALL})
     sites.start("hall")
-    sites.walk(2, yard={A: SMALL})
+    sites.walk(4, yard={A: SMALL})
     assert [person.person_id for person in sites.running["yard"].decider.people.identity.people] == [1]
     sites.walk(5, hall={B: SMALL}, yard={A: SMALL})
     assert (sites.number("yard", A), sites.number("hall", B)) == (1, 4)
+
+
+async def test_a_second_service_that_has_just_started_makes_nobody_forgotten(sites: LinkedSites) -> None:
+    sites.walk(5, hall={A: SMALL})
+    sites.walk(2)
+    yard = sites.running["yard"].other_sites
+    message = SitePeople(index=0, of=3, numbered_since=9e9, cameras=[], people=b"")
+    for _ in range(5):
+        yard.receive("hall", Message("", msgspec.msgpack.encode(message), b""))
+        sites.walk(1)
+    sites.walk(4, yard={A: SMALL})
+    assert sites.number("yard", A) == 1
+
+
+async def test_a_number_of_another_site_is_restored_and_raises_no_own_one(sites: LinkedSites) -> None:
+    sites.walk(5, hall={A: SMALL})
+    sites.walk(2)
+    sites.walk(4, yard={A: SMALL})
+    before = sites.running["yard"].decider.people
+    snapshots = state_for_cameras(before, CAMERAS, before.newest, 100, 5.0)
+    assert {person.number for person in snapshots["c0"].people} == {1}
+    high = msgspec.structs.replace(snapshots["c0"].people[0], number=3 * 10**8 + 1)
+    snapshots["c0"] = msgspec.structs.replace(snapshots["c0"], people=[high])
+    restarted = FedService(sites.running["yard"].config)
+    for camera, snapshot in snapshots.items():
+        restarted.state_replication.alive(KEYS.camera(camera, "alive"), is_present=True)
+        message = Message(KEYS.camera(camera, "retained"), msgspec.msgpack.encode(snapshot), b"")
+        restarted.state_replication.snapshot_received(message)
+    epoch = before.newest // STRIDE + 1
+    for camera in CAMERAS:
+        seen = {A: SMALL} if camera == "c0" else {}
+        restarted.ingest.tracks(tracks(camera_tracks(camera, epoch, seen)))
+    restarted.pulses.newest = end_of_epoch(epoch, STRIDE)
+    restarted.decide()
+    people = restarted.decider.people
+    assert people.person_of("c0", 1, A, people.newest) == 3 * 10**8 + 1
+    assert people.next_number == 2
+    restarted.close()
 
 
 async def test_people_of_other_sites_are_bounded() -> None:
