@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 import msgspec
 
+from server.config.password_file import password_of
 from server.config.pulse_access import bestview_client_name
 from server.config.sections import LinkSettings, site_user
 from server.config.site_config import Config
@@ -110,6 +111,8 @@ class BusConnection:
             UserError: the password file cannot be read, or the address is not supported.
         """
         user = None if link.users is None else site_user(self._config.site.name)
+        if link.users is not None and user is not None:
+            password_of(link.users, user, f"sites.link.{name}.users")  # named so in an error
         bus = Bus.client(link.bus(self._config.zenoh.lease_s), user)
         self._other_sites.append(bus)
         self.inboxes.append(bus.subscribe(ZenohKeys(name).bestview("**/people"), on_people))

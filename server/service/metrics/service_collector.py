@@ -111,6 +111,13 @@ class ServiceCollector(Collector):
             "Records of the leading service whose numbers replaced this one's.",
             value=replication.followed,
         )
+        heard = GaugeMetricFamily(
+            "myview_linked_site_up", "Another site is heard and accepted.", labels=["site"]
+        )
+        sites = self._pipeline.other_sites
+        for name, site in sorted(sites.sites.items()):
+            heard.add_metric([name], float(site.is_there(sites.now)))
+        yield heard
 
 
 class RenderingCollector(Collector):

@@ -115,6 +115,7 @@ class OtherSites:
         """
         if self.is_alone:
             return
+        self._began = self._clock()
         await asyncio.to_thread(self._ledger.read)
         for name, site in self.sites.items():
             self._bus.link_site(name, site.settings, partial(self.receive, name))
@@ -277,8 +278,8 @@ class OtherSites:
             if site.heard_at is not None and not site.is_there(now, SILENT_S):
                 left = self.elsewhere.leave_silent_site(site)
                 self._people.identity.see_elsewhere([person.sighting() for person in left], {})
-            elif site.heard_at is None and not site.refused and self._began + _UNHEARD_S < now:
-                self._began = float("inf")
+            elif site.heard_at is None and not site.is_missed and self._began + _UNHEARD_S < now:
+                site.is_missed = True
                 log.warning(
                     "site %s: nothing heard from sites.link.%s.connect: is it up, is that its site.name, and "
                     "does its zenoh.users have this site's line?",

@@ -69,6 +69,8 @@ class LinkedSite:
     """Of its last message, monotonic seconds."""
     index: int = -1
     numbered_since: float | None = None
+    is_missed: bool = False
+    """Whether it was logged that nothing was heard of it."""
     refused: str = ""
     """Why its messages are not used; empty: they are."""
     viewers: Viewers = field(default_factory=Viewers)

@@ -16,6 +16,8 @@ from fakes.prometheus.monitoring_files import (
 from fakes.prometheus.promql_series import ExportedMetrics, select_series, selectors
 from fakes.service.fed_site import ServedSite
 from fakes.service.scripted_cameras import CAMERAS, camera_tracks, status, tracks
+from server.config.sections import LinkSettings
+from server.service.other_sites.people_elsewhere import LinkedSite
 
 SEVERITIES = {"critical", "warning", "info"}
 
@@ -23,6 +25,8 @@ SEVERITIES = {"critical", "warning", "info"}
 async def printed(served: ServedSite) -> ExportedMetrics:
     """Return the metrics of a site in which all of them have values."""
     served.service.joint.offsets = dict.fromkeys(CAMERAS, 0.1)
+    link = LinkSettings(connect="tcp/127.0.0.1:1", url="http://yard/")
+    served.service.other_sites.sites["yard"] = LinkedSite("yard", link)
     for camera in CAMERAS:
         served.service.ingest.status(status(camera))
         served.service.ingest.tracks(tracks(camera_tracks(camera, 2, {}, solved_at=1.0)))
