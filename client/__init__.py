@@ -1,6 +1,6 @@
 """The Python client of MyView's HTTP interface; ``page/`` is the browser's."""
 
-from client.api import cameras, choice, delays, objects, past, site, spans
+from client.api import cameras, choice, delays, elsewhere, objects, past, site, spans
 from client.deletion import PersonDeletion, delete_person, plan_deletion
 from client.events import events
 from client.http import (
@@ -66,6 +66,7 @@ __all__ = [
     "choice",
     "delays",
     "delete_person",
+    "elsewhere",
     "events",
     "objects",
     "past",

@@ -11,6 +11,7 @@ from client.model import (
     Choice,
     Delay,
     Delays,
+    Elsewhere,
     Gop,
     Objects,
     Past,
@@ -41,6 +42,11 @@ async def delays(url: str, settings: HttpSettings = _DEFAULT) -> tuple[Delay, ..
 async def objects(url: str, settings: HttpSettings = _DEFAULT) -> tuple[SeenObject, ...]:
     """Return the objects that are or were tracked, in the server's order; errors as ``site``."""
     return (await get_json(server_url(url) / "api/objects", Objects, settings)).objects
+
+
+async def elsewhere(url: str, settings: HttpSettings = _DEFAULT) -> tuple[Elsewhere, ...]:
+    """Return the objects of other services and sites, by number; errors as ``site``."""
+    return (await get_json(server_url(url) / "api/objects", Objects, settings)).elsewhere
 
 
 async def cameras(url: str, settings: HttpSettings = _DEFAULT) -> tuple[Camera, ...]:

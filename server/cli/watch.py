@@ -12,7 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from client import AwayError as ServerAway
-from client import ClientError, HttpSettings, Progress, objects, watch
+from client import ClientError, HttpSettings, Progress, elsewhere, objects, watch
 from server.system.atomic_write import check_output_file
 from server.system.errors import UnavailableError, UserError, reason_of
 
@@ -82,6 +82,9 @@ async def _list(url: str, settings: HttpSettings) -> None:
         label = escape(f"{person.object} {person.name}") if person.name else str(person.object)
         visible = "yes" if person.visible else "no"
         table.add_row(label, visible, person.camera or "-", " ".join(person.cameras))
+    for other in await elsewhere(url, settings):
+        if other.site is not None:
+            table.add_row(str(other.object), "yes" if other.visible else "no", f"site {other.site}", "")
     Console().print(table)
 
 

@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import aiohttp
+import pytest
 
 from fakes.http.tokens import IN_FUTURE, bearer, token_entry, token_of, write_tokens
 from fakes.service.linked_sites import LinkedSites, linked_sites
 from fakes.service.scripted_cameras import LARGE, SMALL
+from server.cli.watch import run_watch
 from server.config.sections import HttpSettings
 from server.http.access.authorization import ACCESS
 from server.http.app import make_app, serving
@@ -25,11 +27,11 @@ class Served:
     """Two sites, and requests to the hall."""
 
     def __init__(self, sites: LinkedSites, url: str, session: aiohttp.ClientSession) -> None:
-        self.sites, self._url, self._session = sites, url, session
+        self.sites, self.url, self._session = sites, url, session
 
     async def get(self, path: str, name: str | None = None) -> tuple[int, str | None, Any]:
         headers = {} if name is None else bearer(name)
-        async with self._session.get(self._url + path, allow_redirects=False, headers=headers) as answer:
+        async with self._session.get(self.url + path, allow_redirects=False, headers=headers) as answer:
             content = await answer.json() if answer.content_type == "application/json" else None
             return answer.status, answer.headers.get("Location"), content
 
@@ -76,6 +78,14 @@ async def test_viewers_are_led_to_the_site_that_sees_the_person() -> None:
         served.sites.walk(4, hall={A: SMALL})
         assert await served.elsewhere() == [{"object": 2, **there}]
         assert (await served.get("/objects/1/best.mp4"))[0] != 307
+
+
+async def test_people_at_other_sites_are_listed_in_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    async with two_sites(OPEN, OPEN) as served:
+        await run_watch([served.url], None, None, None)
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert ["1", "yes", "site", "yard"] in rows
+    assert ["2", "yes", "site", "yard"] in rows
 
 
 async def test_a_site_with_tokens_tells_nobody_without_one_who_is_there(tmp_path: Path) -> None:
