@@ -29,6 +29,8 @@ _SEEN = 0.4
 _PLAIN = 0.2
 # Gray levels, at the scene's contrast, by which a cover differs from what it hides; least contrast believed.
 _DIFFERS, _LEAST_CONTRAST = 10.0, 0.2
+# Gray levels by which the soft edge of a cover differs.
+_VEILED = 5.0
 # Shares of the picture: of the least cover, which is larger than what is plain of a person; and of all covers
 # together from which they are believed at once.
 _LEAST, _MUCH = 0.05, 0.25
@@ -109,8 +111,10 @@ class CoverFinder:
         self._take(found, evidence)
 
     def _take(self, found: Cells, evidence: _Evidence) -> None:
-        # At its edge the cover hides a part of the cells.
-        self.cells = _grown(found) if found.any() else None
+        # At its edge the cover hides a part of the cells, and veils those beyond.
+        edge = _grown(found)
+        veiled = _grown(edge) & (np.abs(evidence.deviation) > _VEILED)
+        self.cells = edge | veiled if found.any() else None
         rest = evidence.noticed if self.cells is None else evidence.noticed & ~self.cells
         shown = np.count_nonzero(evidence.seen & rest)
         self.rest_is_seen = bool(shown >= max(_REST_SEEN * np.count_nonzero(rest), _LIGHT_CELLS))
