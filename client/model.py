@@ -230,7 +230,7 @@ class Elsewhere(msgspec.Struct, frozen=True):
     site: str | None = None
     """The other site's name; None: it is of this one."""
     visible: bool | None = None
-    """Whether the other site sees them now; None: it is of this one."""
+    """Whether the other site or area sees them now; None: a service that all cameras send to."""
     token: bool = False
     """Whether it is another site that requires a token, and accepts the client's."""
 

@@ -46,7 +46,7 @@ class ViewHistory:
         self.number = number
         self.site: Site | None = None
         self.elsewhere: Elsewhere | None = None
-        """Where they are, if another site sees the object now."""
+        """Where they are, if another site or area sees the object now."""
         self._spool = spool
         self._firsts: list[int] = []
         self._shown: dict[int, _Shown] = {}
@@ -66,7 +66,7 @@ class ViewHistory:
         if any(here.visible for here in objects.objects if self.number in {here.object, *here.aliases}):
             return None
         places = (place for place in objects.elsewhere if place.object == self.number)
-        return next((place for place in places if place.site and place.server and place.visible), None)
+        return next((place for place in places if place.server and place.visible), None)
 
     def camera_at(self, media_time: float | None) -> str | None:
         """Return the camera shown at ``media_time`` (seconds: pulse / fps); None if unknown."""

@@ -1,15 +1,19 @@
-/** People at other sites, as links to them; the page goes with the selected person. */
+/** People at other sites or in other areas, as links to them; the page goes with the selected person. */
 
 import { make } from '../shared/dom.js';
 
 /** @import {Elsewhere} from '../shared/api_types.js' */
 /** @import {Viewer} from '../viewer.js' */
 
-const SETTLED_MS = 3000; // after the page was opened: a person whom two sites see for a moment is not followed to and fro
+const SETTLED_MS = 3000; // after the page was opened: a person whom two sites or areas see for a moment is not followed to and fro
 
 export class PeopleElsewhere {
   #shown = '';
   #opened = performance.now();
+  /** @type {(Elsewhere & {address: string})[]} */
+  #others = [];
+  /** @type {number | undefined} */
+  #due;
 
   /**
    * @param {HTMLDetailsElement} section with a list element
@@ -33,17 +37,25 @@ export class PeopleElsewhere {
       this.section.hidden = others.length === 0;
       this.list.replaceChildren(...others.map(item));
     }
-    const selected = others.find(({ object, visible }) => visible && object === this.viewer.object);
-    if (selected && this.viewer.follows && performance.now() - this.#opened > SETTLED_MS) location.assign(selected.address);
+    this.#others = others;
+    clearTimeout(this.#due);
+    const wait = this.#opened + SETTLED_MS - performance.now();
+    if (wait <= 0) this.#follow();
+    else this.#due = setTimeout(() => this.#follow(), wait);
+  }
+
+  #follow() {
+    const selected = this.#others.find(({ object, visible }) => visible && object === this.viewer.object);
+    if (selected && this.viewer.follows) location.assign(selected.address);
   }
 }
 
 /**
  * @param {Elsewhere} person
- * @returns {string | null} the address of the other site's page with this person; null: they are not at another site
+ * @returns {string | null} the address of the page there with this person; null: this page has them
  */
-function addressOf({ object, server, site }) {
-  if (!site || !server || !URL.canParse(server)) return null;
+function addressOf({ object, server, site, visible }) {
+  if (!(site || visible) || !server || !URL.canParse(server)) return null;
   const address = new URL(server);
   if (!['http:', 'https:'].includes(address.protocol)) return null;
   address.searchParams.set('object', String(object));
@@ -53,5 +65,5 @@ function addressOf({ object, server, site }) {
 /** @param {Elsewhere & {address: string}} person */
 function item({ object, site, visible, address }) {
   const link = make('a', { href: address, textContent: `Person ${object}` });
-  return make('li', {}, link, visible ? ` at ${site}` : ` left ${site}`);
+  return make('li', {}, link, site ? (visible ? ` at ${site}` : ` left ${site}`) : ' in another area');
 }

@@ -50,7 +50,7 @@
  * @property {number} object
  * @property {string | null} server base URL
  * @property {string | null} [site] name of the other site; null: it is another service of this one
- * @property {boolean | null} [visible] whether the other site sees them now
+ * @property {boolean | null} [visible] whether the other site or area sees them now; null: a service that all cameras send to
  *
  * @typedef {object} Camera an entry of /api/cameras
  * @property {string} camera

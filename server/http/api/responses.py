@@ -59,7 +59,10 @@ def objects_info(service: BestViewService, token: str | None = None) -> Objects:
         )
         for person in service.people.list_people()
     ]
-    elsewhere = [Elsewhere(person.number, person.server) for person in service.people.list_remote_people()]
+    elsewhere = [
+        Elsewhere(person.number, person.server, visible=person.is_visible)
+        for person in service.people.list_remote_people()
+    ]
     elsewhere += [
         Elsewhere(person.number, person.url, person.site, person.is_visible, person.knows_token)
         for person in service.sites.list_people(token)

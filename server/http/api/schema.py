@@ -75,7 +75,8 @@ class Elsewhere(msgspec.Struct, frozen=True):
     site: str | None = None
     """The other site's name; null: it is of this one."""
     visible: bool | None = None
-    """Whether the other site sees the person now; null: it is of this one."""
+    """Whether the other site, or the service of another area, sees the person now; null: a service that all
+    cameras send to."""
     token: bool = False
     """Whether it is another site that requires a token, and accepts that of the request."""
 

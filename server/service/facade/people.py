@@ -60,6 +60,8 @@ class RemotePerson:
     number: int
     server: str | None
     """Base URL of that service; None where the configuration does not name it."""
+    is_visible: bool | None
+    """True: in the area of that service; None: it has the same cameras as this one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +140,11 @@ class PeopleService:
         """Return the people of the site's other services, by number."""
         share, people = self._pipeline.config.view.share, self._pipeline.decider.people
         return [
-            RemotePerson(number, share_address(people.of_service.share_of(number), share))
+            RemotePerson(
+                number,
+                share_address(people.of_service.share_of(number), share),
+                True if share.areas else None,
+            )
             for number in people.of_other_shards
         ]
 

@@ -9,14 +9,15 @@ import msgspec
 
 from server.config.sections import ShareSettings
 from server.messaging.service_record import ServiceRecord
+from server.service.identity.local_numbers import TrackName
 from server.service.identity.people import PersonTracker
 from server.service.identity.sharding import PeopleOfArea
+from server.service.identity.track_parts import UNCONFIRMED
 from server.service.replication.disagreements import (
     Disagreements,
     find_disagreements,
     follow,
     numbers_of_tracks,
-    snapshots_without,
 )
 
 log = logging.getLogger(__name__)
@@ -35,6 +36,7 @@ class AreaAgreement:
 
     def __init__(self, share: ShareSettings, people: PersonTracker) -> None:
         self._share, self._people = share, people
+        self._cameras = frozenset(share.cameras or ())
         self._last_found: dict[int, Disagreements] = {}
         """By area, what its last record would change."""
         self._waiting: dict[int, dict[int, ServiceRecord]] = {}
@@ -59,7 +61,7 @@ class AreaAgreement:
             for pulse in sorted(waiting)[:-_WAITING_MAX]:
                 del waiting[pulse]
 
-    def step(self, own: Mapping[int, ServiceRecord], live: Iterable[ServiceRecord]) -> list[ServiceRecord]:
+    def step(self, own: Mapping[int, ServiceRecord], live: Iterable[ServiceRecord]) -> int:
         """Take in who is in the other areas, and take over their numbers where two records in a row say so.
 
         Args:
@@ -67,45 +69,50 @@ class AreaAgreement:
             live: the other services' newest ones.
 
         Returns:
-            The records by which a number has changed.
+            The number of records by which a number has changed.
         """
         area = self._people.of_service
         if not isinstance(area, PeopleOfArea):
-            return []
+            return 0
         others = [record for record in live if self.is_other(record)]
         area.hear({number: record.service % self._share.of for record in others for number in record.in_area})
-        changed = []
+        newest = max(own, default=-1)
+        due = []
         for record in others:
             waiting = self._waiting.get(record.service, {})
-            pulses = sorted(waiting.keys() & own.keys())
-            changed += [record for pulse in pulses if self._follow(own[pulse], waiting[pulse])]
-            newest = max(own, default=-1)
-            self._waiting[record.service] = {p: each for p, each in waiting.items() if p > newest}
-        return changed
+            due += [each for pulse, each in sorted(waiting.items()) if pulse in own]
+            self._waiting[record.service] = {pulse: each for pulse, each in waiting.items() if pulse > newest}
+        numbers = {pulse: numbers_of_tracks(own[pulse].cameras) for pulse in {each.pulse for each in due}}
+        return sum(self._follow(numbers[each.pulse], own[each.pulse].in_area, each) for each in due)
 
-    def _follow(self, own: ServiceRecord, other: ServiceRecord) -> bool:
+    def _follow(self, own: Mapping[TrackName, int], in_area: Mapping[int, int], other: ServiceRecord) -> bool:
         """Take over the numbers of people in another area; return whether any has changed.
 
-        Both records are of one pulse.
+        Args:
+            own: who the tracks are here at the pulse of the record.
+            in_area: since when each person in this area has been known, by number.
+            other: the other area's record.
         """
         area = other.service % self._share.of
-        found = find_disagreements(own.cameras, snapshots_without(other.cameras, _not_followed(own, other)))
+        seen_here = {
+            camera: snapshot for camera, snapshot in other.cameras.items() if camera in self._cameras
+        }
+        theirs = numbers_of_tracks(seen_here)
+        skipped = set[int]()
+        for track, number in theirs.items():
+            known = own.get(track, UNCONFIRMED)
+            is_older = known in in_area and (in_area[known], known) <= (
+                other.in_area.get(number, 0),
+                number,
+            )
+            if number not in other.in_area or is_older:  # not there, or they came from here
+                skipped.add(number)
+        found = find_disagreements(
+            own, {track: number for track, number in theirs.items() if number not in skipped}
+        )
         agreed = found.common(self._last_found.get(area, Disagreements()))
         self._last_found[area] = found
         if agreed:
             follow(self._people, agreed)
             log.debug("people's numbers of area %d: %s", area, msgspec.json.encode(agreed).decode())
         return bool(agreed)
-
-
-def _not_followed(own: ServiceRecord, other: ServiceRecord) -> set[int]:
-    """Return whose numbers in another area's record do not count: they are not there, or came from here."""
-    own_numbers = numbers_of_tracks(own.cameras)
-    skipped = set[int]()
-    for track, number in numbers_of_tracks(other.cameras).items():
-        known = own_numbers.get(track)
-        if number not in other.in_area or (
-            known in own.in_area and (own.in_area[known], known) <= (other.in_area[number], number)
-        ):
-            skipped.add(number)
-    return skipped

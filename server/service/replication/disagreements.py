@@ -6,8 +6,6 @@ from collections import Counter, defaultdict
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
-import msgspec
-
 from server.messaging.camera_identity_snapshot import CameraIdentitySnapshot
 from server.service.identity.local_numbers import TrackName
 from server.service.identity.people import PersonTracker
@@ -43,41 +41,29 @@ class Disagreements:
         return bool(self.renumbered or self.merged or self.split)
 
 
-def numbers_of_tracks(snapshots: Snapshots) -> dict[TrackName, int]:
-    """Return the person number of each track."""
+def numbers_of_tracks(snapshots: Snapshots, without: Collection[int] = ()) -> dict[TrackName, int]:
+    """Return the person number of each track, except for those of some people."""
     return {
         TrackName(camera, snapshot.boot, track): person.number
         for camera, snapshot in snapshots.items()
         for person in snapshot.people
+        if person.number not in without
         for track in person.tracks
     }
 
 
-def snapshots_without(snapshots: Snapshots, numbers: Collection[int]) -> Snapshots:
-    """Return a record without some people."""
-    return {
-        camera: msgspec.structs.replace(
-            snapshot, people=[person for person in snapshot.people if person.number not in numbers]
-        )
-        for camera, snapshot in snapshots.items()
-    }
-
-
-def find_disagreements(own: Snapshots, leading: Snapshots) -> Disagreements:
-    """Compare two records of one pulse, by the tracks that both have.
+def find_disagreements(own: Mapping[TrackName, int], leading: Mapping[TrackName, int]) -> Disagreements:
+    """Compare who the tracks are in two records of one pulse, by those that both have.
 
     A person is renumbered where all of their tracks have other numbers in the leading record; of several the
     most frequent, then the lowest. They are merged into another where that number is somebody's whom the
     leading record has with the same number. Where only some of the tracks differ, these are split off.
     """
-    own_numbers, leading_numbers = numbers_of_tracks(own), numbers_of_tracks(leading)
-    common = sorted(
-        own_numbers.keys() & leading_numbers.keys(), key=lambda track: (track.camera, track.track)
-    )
+    common = sorted(own.keys() & leading.keys(), key=lambda track: (track.camera, track.track))
     wanted: dict[int, Counter[int]] = defaultdict(Counter)
     cameras: dict[tuple[int, int], set[str]] = defaultdict(set)
     for track in common:
-        number, other = own_numbers[track], leading_numbers[track]
+        number, other = own[track], leading[track]
         wanted[number][other] += 1
         cameras[number, other].add(track.camera)
     agreed = {number for number, votes in wanted.items() if votes[number]}

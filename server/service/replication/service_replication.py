@@ -39,7 +39,7 @@ from server.service.replication.disagreements import (
     Disagreements,
     find_disagreements,
     follow,
-    snapshots_without,
+    numbers_of_tracks,
 )
 from server.service.replication.state import restore_people, state_of
 
@@ -211,12 +211,13 @@ class ServiceReplication:
             self._leader = index
             log.info("best-view service %d leads", index)
         live = [received.record for received in self._live()]
-        for record in self._areas.step(self._own, live):
-            self._follow_numbering(record)
-            self.followed += 1
+        self.followed += self._areas.step(self._own, live)
         for record in live:
             own = self._own.get(record.pulse)
-            if own is None or self._areas.is_other(record):
+            if self._areas.is_other(record):
+                self._follow_numbering(record)
+                continue
+            if own is None:
                 continue
             del self._own[record.pulse]
             self._reserve(own, record)
@@ -225,7 +226,7 @@ class ServiceReplication:
                 gone = set(self._of_cameras.forgotten)
                 self._follow(
                     find_disagreements(
-                        snapshots_without(own.cameras, gone), snapshots_without(record.cameras, gone)
+                        numbers_of_tracks(own.cameras, gone), numbers_of_tracks(record.cameras, gone)
                     )
                 )
 

@@ -174,6 +174,14 @@ async def west_service() -> AsyncIterator[str]:
     service.close()
 
 
+async def test_people_of_other_areas_are_listed_with_their_service(west_service: str) -> None:
+    async with aiohttp.ClientSession() as session, session.get(west_service + "/api/objects") as answer:
+        listed = await answer.json()
+    assert [person["object"] for person in listed["objects"]] == [1]
+    (elsewhere,) = listed["elsewhere"]
+    assert (elsewhere["object"], elsewhere["server"], elsewhere["visible"]) == (2, "http://east:1/", True)
+
+
 async def test_live_requests_for_another_area_are_redirected(west_service: str) -> None:
     async with aiohttp.ClientSession() as session:
 
