@@ -13,6 +13,7 @@ import os
 import re
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -126,6 +127,7 @@ def plot(steps: Sequence[StartupStep], path: Path) -> None:
 def main() -> None:
     """Run the benchmark."""
     chosen = parser(__doc__ or "", "startup").parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # through `_demo`, which ends the site
     report = Report()
     with tempfile.TemporaryDirectory(prefix="myview-startup-") as folder:
         clone = Path(folder) / "clone"
