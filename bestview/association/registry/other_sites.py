@@ -47,8 +47,8 @@ class IdSeries:
     def first_from(self, person_id: int) -> int:
         """Return the lowest id of the series from an id on.
 
-        >>> [IdSeries(1, 3).first_from(person_id) for person_id in (0, 1, 2, 3)]
-        [2, 2, 2, 5]
+        >>> IdSeries(1, 3).first_from(2), IdSeries(1, 3).first_from(3)
+        (2, 5)
         """
         least = max(person_id, 1)
         return least + (self.index + 1 - least) % self.step
