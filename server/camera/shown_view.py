@@ -78,7 +78,8 @@ class ShownView:
             return
         self._covered, self._flicker = covered, flicker
         cells = [] if covered is None else [covered]
-        cells += [] if flicker is None else [cells_of(flicker)]
+        grid = None if covered is None else covered.shape
+        cells += [] if flicker is None else [cells_of(flicker, grid)]
         hidden = [] if not cells else [cell_rectangles(np.logical_or.reduce(cells), size)]
         self.hidden = self._scale.boxes_to_site(np.concatenate([np.empty((0, BOX_SIDES)), *hidden]))
 

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tracking.boxes import Floats
-from tracking.picture_condition.structure import FINE_NOISE, Structure, cell_means
+from tracking.picture_condition.structure import FINE_NOISE, Structure, cell_means, grid_of
 
 Cells = npt.NDArray[np.bool_]
 
@@ -132,9 +132,10 @@ _LEAST_EDGES = 1e-4
 
 def _evidence(structure: Structure, reference: Structure, noise: float) -> _Evidence | None:
     """Return what the cells of a picture say; None: too few show the scene."""
-    expected = cell_means(reference.across**2 + reference.down**2, _CELLS)
-    raw = cell_means(structure.across**2 + structure.down**2, _CELLS)
-    product = cell_means(structure.across * reference.across + structure.down * reference.down, _CELLS)
+    grid = grid_of(structure.gray.shape, _CELLS)
+    expected = cell_means(reference.across**2 + reference.down**2, grid)
+    raw = cell_means(structure.across**2 + structure.down**2, grid)
+    product = cell_means(structure.across * reference.across + structure.down * reference.down, grid)
     textured = expected > _EDGE
     # Where a drawn picture has no edges and no noise either, nothing agrees.
     seen = textured & (product > _SEEN * np.sqrt(expected * np.maximum(raw, _LEAST_EDGES * expected)))
@@ -151,7 +152,7 @@ def _evidence(structure: Structure, reference: Structure, noise: float) -> _Evid
 
 def _deviation(structure: Structure, reference: Structure, seen: Cells) -> Floats:
     """Return by how much cells are brighter than the scene is in this light, which may vary by row."""
-    now, before = cell_means(structure.gray, _CELLS), cell_means(reference.gray, _CELLS)
+    now, before = cell_means(structure.gray, seen.shape), cell_means(reference.gray, seen.shape)
     rows = np.broadcast_to(np.linspace(-1.0, 1.0, len(now))[:, None], now.shape)
     terms = np.stack([before, np.ones_like(before), rows, rows * before], axis=-1)
     fit, *_ = np.linalg.lstsq(terms[seen], now[seen], rcond=None)
@@ -172,8 +173,8 @@ def _is_sharp(
 ) -> bool:
     """Return whether the outline of a part is a sharp edge, which the scene has not."""
     outline = _grown(part) & ~(cv2.erode(part.astype(np.uint8), _AROUND) > 0)
-    detail = cell_means(structure.fine**2, _CELLS) - FINE_NOISE * noise
-    more = np.maximum(detail - cell_means(reference.fine**2, _CELLS), 0.0)
+    detail = cell_means(structure.fine**2, part.shape) - FINE_NOISE * noise
+    more = np.maximum(detail - cell_means(reference.fine**2, part.shape), 0.0)
     step = float((evidence.deviation[part] ** 2).mean())
     return float(more[outline].mean()) > _SHARP * step
 

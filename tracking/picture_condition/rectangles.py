@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.detectors.base import Mask
+from tracking.picture_condition.structure import grid_of
 
 Cells = npt.NDArray[np.bool_]
 
@@ -17,12 +18,16 @@ _MOST = 0.5
 """Least share of a cell that belongs to the part."""
 
 
-def cells_of(mask: Mask) -> Cells:
-    """Return the cells `(R, C)` of a picture of which a mask `(h, w)`, 255 or 0, has most."""
-    height, width = mask.shape
-    cell = max(height, width) / _CELLS
-    size = (max(round(width / cell), 1), max(round(height / cell), 1))
-    return np.asarray(cv2.resize(mask, size, interpolation=cv2.INTER_AREA) >= _MOST * np.iinfo(np.uint8).max)
+def cells_of(mask: Mask, grid: tuple[int, ...] | None = None) -> Cells:
+    """Return the cells `(R, C)` of a picture of which a mask `(h, w)`, 255 or 0, has most.
+
+    Args:
+        mask: of the whole picture, at any size.
+        grid: rows and columns; None: those of its own size.
+    """
+    rows, columns = grid_of(mask.shape, _CELLS) if grid is None else grid
+    shares = cv2.resize(mask, (columns, rows), interpolation=cv2.INTER_AREA)
+    return np.asarray(shares >= _MOST * np.iinfo(np.uint8).max)
 
 
 def cell_rectangles(cells: Cells, size: tuple[int, int]) -> Floats:

@@ -42,7 +42,7 @@ class Structure:
 
         It depends neither on brightness nor on contrast.
         """
-        product = cell_means(self.across * other.across + self.down * other.down)
+        product = cell_means(self.across * other.across + self.down * other.down, self.edges.shape)
         return np.asarray(product / np.sqrt(np.maximum(self.edges * other.edges, _LEAST_PRODUCT)))
 
     def noise(self, other: Structure) -> float:
@@ -51,8 +51,9 @@ class Structure:
         Noise is independent from pixel to pixel; light and motion change gradients more than fine detail.
         """
         across, down = self.across - other.across, self.down - other.down
-        gradient = float(np.median(cell_means(across * across + down * down))) / 2.0
-        fine = float(np.median(cell_means((self.fine - other.fine) ** 2))) / 2.0
+        grid = self.edges.shape
+        gradient = float(np.median(cell_means(across * across + down * down, grid))) / 2.0
+        fine = float(np.median(cell_means((self.fine - other.fine) ** 2, grid))) / 2.0
         return min(gradient, fine / FINE_NOISE)
 
 
@@ -67,7 +68,8 @@ def structure_of(gray: Plane) -> Structure:
     across = np.asarray(cv2.Sobel(coarse, cv2.CV_32F, 1, 0, scale=0.125), dtype=np.float32)
     down = np.asarray(cv2.Sobel(coarse, cv2.CV_32F, 0, 1, scale=0.125), dtype=np.float32)
     fine = gray - cv2.GaussianBlur(gray, (5, 5), 1.0)
-    edges, detail = cell_means(across * across + down * down), cell_means(fine * fine)
+    grid = grid_of(gray.shape, _CELLS)
+    edges, detail = cell_means(across * across + down * down, grid), cell_means(fine * fine, grid)
     return Structure(gray, across, down, fine, edges, detail)
 
 
@@ -81,9 +83,17 @@ def reduce(image: Image) -> Plane:
     return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.float32)
 
 
-def cell_means(plane: Plane, cells: int = _CELLS) -> Floats:
-    """Return the mean of each cell of a plane, `(R, C)`; so many `cells` lie along its longer side."""
-    height, width = plane.shape
+def grid_of(shape: tuple[int, ...], cells: int) -> tuple[int, int]:
+    """Return rows and columns of nearly square cells in a picture `(h, w)`, `cells` along its longer side.
+
+    A picture of half the size may have another grid: take the gray picture's for all that belongs to it.
+    """
+    height, width = shape
     cell = max(height, width) / cells
-    size = (max(round(width / cell), 1), max(round(height / cell), 1))
-    return np.asarray(cv2.resize(plane, size, interpolation=cv2.INTER_AREA), dtype=np.float64)
+    return max(round(height / cell), 1), max(round(width / cell), 1)
+
+
+def cell_means(plane: Plane, grid: tuple[int, ...]) -> Floats:
+    """Return the mean of each cell of a plane, `(R, C)`, in a `grid` of as many rows and columns."""
+    rows, columns = grid
+    return np.asarray(cv2.resize(plane, (columns, rows), interpolation=cv2.INTER_AREA), dtype=np.float64)

@@ -11,7 +11,8 @@ import pytest
 
 from tracking.boxes import Floats, areas, iou
 from tracking.detectors import Image
-from tracking.picture_condition import PictureMonitor, cell_rectangles
+from tracking.picture_condition import PictureMonitor, cell_rectangles, cells_of
+from tracking.picture_condition.structure import structure_of
 
 WIDTH, HEIGHT, FPS = 320, 180, 5.0
 KNOWN_S = 16.0
@@ -151,3 +152,31 @@ def test_a_picture_that_stands_still_shows_nothing_from_half_a_second_on_until_i
         shown.append((seconds, monitor.shows_now))
     assert not any(is_shown for seconds, is_shown in shown if 1.0 <= seconds < 5.0)
     assert all(is_shown for seconds, is_shown in shown if seconds >= 5.2)
+
+
+def test_pictures_of_every_shape_have_one_grid() -> None:
+    plane = np.arange(320.0 * 320.0, dtype=np.float32).reshape(320, 320) % 251.0
+    for side in range(48, 321):
+        for gray in (plane[:side], plane[:, :side]):
+            structure = structure_of(np.ascontiguousarray(gray))
+            assert structure.edges.shape == structure.detail.shape, gray.shape
+
+
+@pytest.mark.parametrize("size", [(320, 185), (185, 320), (640, 410), (4096, 1860), (320, 245), (320, 125)])
+def test_a_cover_is_found_in_pictures_of_any_shape(size: tuple[int, int]) -> None:
+    monitor = PictureMonitor(FPS)
+    room_here = np.asarray(cv2.resize(room(), size), dtype=np.uint8)
+    covered = np.asarray(cv2.resize(painted(room(), 0.0), size), dtype=np.uint8)
+    for frame in range(round(6.0 * FPS)):
+        shown = covered if frame >= 4.0 * FPS else room_here
+        monitor.observe(noisy(shown, frame) if max(size) <= WIDTH else shown, frame)
+    cells = monitor.covered
+    assert cells is not None
+    assert areas(cell_rectangles(cells, size)).sum() == pytest.approx(0.4 * size[0] * size[1], rel=0.25)
+
+
+def test_what_flickers_lies_in_the_grid_of_a_cover() -> None:
+    mask = np.zeros((491, 640), dtype=np.uint8)
+    mask[:, :320] = 255
+    assert cells_of(mask).shape == (25, 32)
+    assert cells_of(mask, (24, 32)).tolist() == [[True] * 16 + [False] * 16] * 24
