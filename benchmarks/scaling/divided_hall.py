@@ -88,11 +88,25 @@ def divide(hall: SimulatedHall, services: int) -> list[dict[str, Any]]:
 
 
 class _Exchange:
-    """What services say to each other."""
+    """What services say to each other; it arrives after all have processed an epoch."""
 
     def __init__(self) -> None:
         self.receivers: dict[int, Callable[[Message], None]] = {}
         self.size = 0
+        self._waiting: list[tuple[int, bytes]] = []
+
+    def send(self, index: int, payload: bytes) -> None:
+        """Send a record to the other services."""
+        self.size += len(payload)
+        self._waiting.append((index, payload))
+
+    def deliver(self) -> None:
+        """Let everything arrive."""
+        for sender, payload in self._waiting:
+            for index, receive in self.receivers.items():
+                if index != sender:
+                    receive(Message(_KEYS.bestview("record", sender), payload, b""))
+        self._waiting.clear()
 
     def end(self, index: int) -> BusConnection:
         """Return a service's connection to the others."""
@@ -109,10 +123,7 @@ class _End:
         return set(self.exchange.receivers) - {self.index}
 
     def publish_record(self, payload: bytes) -> None:
-        self.exchange.size += len(payload)
-        for index, receive in self.exchange.receivers.items():
-            if index != self.index:
-                receive(Message(_KEYS.bestview("record", self.index), payload, b""))
+        self.exchange.send(self.index, payload)
 
 
 class DividedService:
@@ -208,6 +219,7 @@ def run_divided(hall: SimulatedHall, observed: Sequence[Observed], services: int
     for number, seen in enumerate(observed):
         for service in running:
             service.step(number, seen)
+        exchange.deliver()
         tracks: dict[SeenTrack, set[int]] = {}
         people: dict[int, set[int]] = {}
         for service in running:

@@ -33,7 +33,7 @@ class FloorAreas:
         count: of areas; at most as many as there are calibrated cameras.
 
     Raises:
-        ValueError: there are more areas than calibrated cameras that see floor.
+        ValueError: there are more areas than calibrated cameras that see floor, or these see the same.
     """
 
     def __init__(
@@ -58,6 +58,8 @@ class FloorAreas:
         self._bounds = np.stack(_divide(centers, everywhere, count))
         self._own = dict(zip(self._views, self.area_of(centers).tolist(), strict=True))
         """The area of each view's center."""
+        if set(self._own.values()) != set(range(count)):
+            raise ValueError(f"the cameras' views are too alike to divide the floor into {count} areas")
 
     def area_of(self, places: Floats) -> NDArray[np.int64]:
         """Return the area of each of (K, 2) places, (K,); -1: the place is not known (NaN)."""
@@ -66,10 +68,12 @@ class FloorAreas:
         return np.where(inside.any(axis=0), inside.argmax(axis=0), -1)
 
     def floor_of(self, area: int) -> tuple[float, float, float, float]:
-        """Return least x and y, largest x and y of the floor in an area that cameras see."""
+        """Return least x and y, largest x and y of an area; outer ones are far beyond all views."""
         seen = np.concatenate([view.places for view in self._views.values()])
+        extent = np.ptp(seen, axis=0)
         lower, upper = self._bounds[area]
-        least, largest = np.maximum(lower, seen.min(axis=0)), np.minimum(upper, seen.max(axis=0))
+        least = np.maximum(lower, seen.min(axis=0) - extent)
+        largest = np.minimum(upper, seen.max(axis=0) + extent)
         return (*least.tolist(), *largest.tolist())
 
     def cameras_of(self, area: int) -> tuple[str, ...]:

@@ -140,6 +140,9 @@ class Config(BaseSettings):
         for camera in sorted(named.difference(self.camera_ids)):
             known = ", ".join(self.camera_ids)
             raise ValueError(f"view.share.areas: there is no camera {camera!r}; there are {known}")
+        for rule in self.rules if areas else ():
+            if not any(set(rule.cameras) <= {*area.cameras, *area.also} for area in areas):
+                raise ValueError(f"rules: {rule.id}: no area has all of its cameras (view.share.areas)")
         for camera in self.camera_ids if areas else ():
             if camera not in named:
                 raise ValueError(

@@ -15,6 +15,7 @@ import msgspec
 from server.messaging.camera_identity_snapshot import (
     ALIASES_MAX,
     NAME_LENGTH_MAX,
+    PERSON_NUMBER_MAX,
     CameraIdentitySnapshot,
     PersonNumber,
     UnixTime,
@@ -32,6 +33,7 @@ _NUMBERS_MAX = 1000
 _CAMERAS_MAX = 1024
 _PEOPLE_MAX = 100_000
 
+NextNumber = Annotated[int, msgspec.Meta(ge=1, le=PERSON_NUMBER_MAX + 1)]
 Sum = Annotated[float, msgspec.Meta(ge=0, le=1e12)]
 
 
@@ -46,6 +48,15 @@ class DeletedPerson(msgspec.Struct, frozen=True, kw_only=True):
     """Whether the recorded video and sound of the times in which they were visible are deleted, too."""
 
 
+class Stay(msgspec.Struct, frozen=True, array_like=True):
+    """How long a person has been in an area."""
+
+    first_seen: Pulse
+    """By any service."""
+    here: Pulse
+    """When they were certainly in the area, the last time."""
+
+
 class ServiceRecord(msgspec.Struct, frozen=True, kw_only=True):
     """The people that a service tracks at a pulse."""
 
@@ -57,8 +68,10 @@ class ServiceRecord(msgspec.Struct, frozen=True, kw_only=True):
     lowest leads; of equal ones, that with the lowest index. One that was stopped follows the others."""
     cameras: Annotated[dict[str, CameraIdentitySnapshot], msgspec.Meta(max_length=_CAMERAS_MAX)]
     """What each camera tracks."""
-    in_area: Annotated[dict[PersonNumber, Pulse], msgspec.Meta(max_length=_PEOPLE_MAX)] = {}
-    """By number, when each person in the area of the service was seen first; empty: there are no areas."""
+    in_area: Annotated[dict[PersonNumber, Stay], msgspec.Meta(max_length=_PEOPLE_MAX)] = {}
+    """The people in the area of the service, by number; empty: there are no areas."""
+    next_numbers: Annotated[list[NextNumber], msgspec.Meta(max_length=SERVICES_MAX)] = []
+    """By area, the first number that its services have not assigned, as far as is known."""
     deletions: Annotated[list[DeletedPerson], msgspec.Meta(max_length=DELETIONS_MAX)] = []
     """The newest deletions, its own and others', in order: every service carries them out."""
 

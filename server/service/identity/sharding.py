@@ -28,6 +28,14 @@ class TracksOfPeople:
     numbers: Sequence[int | None]
 
 
+@dataclass(frozen=True, slots=True)
+class OtherArea:
+    """The area that another service says a person is in, and the frame in which they certainly were there."""
+
+    area: int
+    here: int
+
+
 class PeopleOfService(Protocol):
     """Which of the people whom it knows a service decides for; the others are other services'."""
 
@@ -98,9 +106,10 @@ class PeopleByNumber:
 class PeopleOfArea:
     """People are divided by area. Who is at a border is known to both services, under one number.
 
-    Somebody is in the area where most of the cameras say they are (`ServiceArea.votes`); if equally many say
-    that they are not, they are in both, as each service knows only some of the cameras. A service from which
-    another one takes somebody over keeps them for a while, so that no stream ends before the next one begins.
+    Somebody is in the area where most of the cameras say they are (`ServiceArea.votes`), or half of them
+    while no other service has them: each knows only some of the cameras. A service from which another one
+    takes somebody over keeps them for a while, so that no stream ends before the next one begins. Whom both
+    have lost sight of stays with the one that has seen them last.
     """
 
     def __init__(self, share: ShareSettings, area: ServiceArea, fps: float) -> None:
@@ -108,13 +117,13 @@ class PeopleOfArea:
         self._released_after = round(_RELEASED_AFTER_S * fps)
         self._seen: dict[int, int] = {}
         """By number, of the people in the area, the last frame in which they certainly were."""
-        self._elsewhere: dict[int, int] = {}
-        """By number, the area of people whom other services have."""
+        self._elsewhere: dict[int, OtherArea] = {}
+        """By number, people whom other services have."""
 
     @property
-    def present(self) -> Collection[int]:
-        """The numbers of people in the area."""
-        return self._seen.keys()
+    def present(self) -> Mapping[int, int]:
+        """The numbers of people in the area, and the frame in which each certainly was, the last time."""
+        return self._seen
 
     def own(self, numbers: Iterable[int], merged: Mapping[int, int]) -> list[int]:
         """Return the numbers of people in the area."""
@@ -127,8 +136,9 @@ class PeopleOfArea:
 
     def share_of(self, number: int) -> int:
         """Return the area where somebody is; this one if nobody else says that they are there."""
-        own = self._share.share
-        return own if number in self._seen else self._elsewhere.get(number, own)
+        if number in self._seen or number not in self._elsewhere:
+            return self._share.share
+        return self._elsewhere[number].area
 
     def update(self, seen: Iterable[TracksOfPeople], frame: int) -> None:
         """Take over who is in the area, and release who is in another one."""
@@ -137,14 +147,21 @@ class PeopleOfArea:
             for number, vote in zip(of_camera.numbers, self._area.votes(of_camera.message), strict=True):
                 if number is not None:
                     votes.setdefault(number, []).append(vote)
-        self._seen |= {number: frame for number, found in votes.items() if 2 * sum(found) >= len(found)}
+        for number, found in votes.items():
+            here, there = sum(found), len(found) - sum(found)
+            if here > there or (here == there and number not in self._elsewhere):
+                self._seen[number] = frame
         self._seen = {
-            number: last
-            for number, last in self._seen.items()
-            if number not in self._elsewhere or frame - last <= self._released_after
+            number: last for number, last in self._seen.items() if not self._is_released(number, last, frame)
         }
 
-    def hear(self, elsewhere: Mapping[int, int]) -> None:
+    def _is_released(self, number: int, last: int, frame: int) -> bool:
+        other = self._elsewhere.get(number)
+        if other is None or frame - last <= self._released_after:
+            return False
+        return (-other.here, other.area) < (-last, self._share.share)
+
+    def hear(self, elsewhere: Mapping[int, OtherArea]) -> None:
         """Replace what other services say about who is in their areas, by number."""
         self._elsewhere = dict(elsewhere)
 

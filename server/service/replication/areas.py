@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 import msgspec
 
 from server.config.sections import ShareSettings
-from server.messaging.service_record import ServiceRecord
+from server.messaging.camera_identity_snapshot import PERSON_NUMBER_MAX
+from server.messaging.service_record import ServiceRecord, Stay
 from server.service.identity.local_numbers import TrackName
 from server.service.identity.people import PersonTracker
-from server.service.identity.sharding import PeopleOfArea
+from server.service.identity.sharding import OtherArea, PeopleOfArea
 from server.service.identity.track_parts import UNCONFIRMED
 from server.service.replication.disagreements import (
     Disagreements,
@@ -37,8 +39,11 @@ class AreaAgreement:
     def __init__(self, share: ShareSettings, people: PersonTracker) -> None:
         self._share, self._people = share, people
         self._cameras = frozenset(share.cameras or ())
+        self._next_numbers = [1] * len(share.areas)
         self._last_found: dict[int, Disagreements] = {}
-        """By area, what its last record would change."""
+        """By service, what its last record would change."""
+        self._changed_at = -1
+        """The pulse of the last change here, up to which own records say what was before."""
         self._waiting: dict[int, dict[int, ServiceRecord]] = {}
         """By service and pulse, records that are not compared yet."""
 
@@ -46,16 +51,36 @@ class AreaAgreement:
         """Return whether a record is of a service of another area."""
         return bool(self._share.areas) and record.service % self._share.of != self._share.share
 
-    def present(self) -> dict[int, int]:
-        """Return since when each person in the area has been known, by number."""
+    def present(self) -> dict[int, Stay]:
+        """Return since when each person in the area has been known, by number, and was there."""
         area, seen = self._people.of_service, self._people.registry.first_seen
         if not isinstance(area, PeopleOfArea):
             return {}
-        return {number: max(seen[number], 0) for number in sorted(area.present) if number in seen}
+        return {
+            number: Stay(first_seen=max(seen[number], 0), here=max(last, 0))
+            for number, last in sorted(area.present.items())
+            if number in seen
+        }
+
+    @property
+    def next_numbers(self) -> list[int]:
+        """By area, the first number that was not assigned, as far as is known."""
+        known = list(self._next_numbers)
+        if known:
+            known[self._share.share] = min(self._people.next_number, PERSON_NUMBER_MAX + 1)
+        return known
+
+    def learn_numbers(self, record: ServiceRecord) -> None:
+        """Assign no number that this area has assigned before, as another service remembers."""
+        if not self.is_other(record) or len(record.next_numbers) != len(self._next_numbers):
+            return
+        self._next_numbers = [max(each) for each in zip(self._next_numbers, record.next_numbers, strict=True)]
+        self._people.reserve_numbers_below(record.next_numbers[self._share.share])
 
     def receive(self, record: ServiceRecord) -> None:
         """Keep a record of another area until this service is at its pulse."""
         if self.is_other(record):
+            self.learn_numbers(record)
             waiting = self._waiting.setdefault(record.service, {})
             waiting[record.pulse] = record
             for pulse in sorted(waiting)[:-_WAITING_MAX]:
@@ -75,7 +100,13 @@ class AreaAgreement:
         if not isinstance(area, PeopleOfArea):
             return 0
         others = [record for record in live if self.is_other(record)]
-        area.hear({number: record.service % self._share.of for record in others for number in record.in_area})
+        area.hear(
+            {
+                number: OtherArea(record.service % self._share.of, stay.here)
+                for record in others
+                for number, stay in record.in_area.items()
+            }
+        )
         newest = max(own, default=-1)
         due = []
         for record in others:
@@ -85,34 +116,54 @@ class AreaAgreement:
         numbers = {pulse: numbers_of_tracks(own[pulse].cameras) for pulse in {each.pulse for each in due}}
         return sum(self._follow(numbers[each.pulse], own[each.pulse].in_area, each) for each in due)
 
-    def _follow(self, own: Mapping[TrackName, int], in_area: Mapping[int, int], other: ServiceRecord) -> bool:
+    def _follow(
+        self, own: Mapping[TrackName, int], in_area: Mapping[int, Stay], other: ServiceRecord
+    ) -> bool:
         """Take over the numbers of people in another area; return whether any has changed.
 
         Args:
             own: who the tracks are here at the pulse of the record.
-            in_area: since when each person in this area has been known, by number.
+            in_area: who is in this area, by number.
             other: the other area's record.
         """
-        area = other.service % self._share.of
+        if other.pulse <= self._changed_at:
+            return False
         seen_here = {
             camera: snapshot for camera, snapshot in other.cameras.items() if camera in self._cameras
         }
         theirs = numbers_of_tracks(seen_here)
-        skipped = set[int]()
-        for track, number in theirs.items():
-            known = own.get(track, UNCONFIRMED)
-            is_older = known in in_area and (in_area[known], known) <= (
-                other.in_area.get(number, 0),
-                number,
-            )
-            if number not in other.in_area or is_older:  # not there, or they came from here
-                skipped.add(number)
+        skipped = {
+            number
+            for track, number in theirs.items()
+            if _is_older(own.get(track, UNCONFIRMED), in_area, number, other.in_area)
+        }
         found = find_disagreements(
             own, {track: number for track, number in theirs.items() if number not in skipped}
         )
-        agreed = found.common(self._last_found.get(area, Disagreements()))
-        self._last_found[area] = found
-        if agreed:
-            follow(self._people, agreed)
-            log.debug("people's numbers of area %d: %s", area, msgspec.json.encode(agreed).decode())
-        return bool(agreed)
+        agreed = found.common(self._last_found.get(other.service, Disagreements()))
+        self._last_found[other.service] = found
+        agreed = replace(agreed, renumbered=self._free(agreed))
+        if not agreed:
+            return False
+        follow(self._people, agreed)
+        self._changed_at = self._people.newest
+        self._last_found.clear()
+        log.debug("people's numbers of service %d: %s", other.service, msgspec.json.encode(agreed).decode())
+        return True
+
+    def _free(self, found: Disagreements) -> dict[int, int]:
+        """Return the new numbers that nobody else has here: who has one keeps it."""
+        registry = self._people.registry
+        present = registry.first_seen.keys() - registry.departed
+        return {
+            old: new
+            for old, new in found.renumbered.items()
+            if new not in present or found.renumbered.get(new, new) != new
+        }
+
+
+def _is_older(own: int, in_area: Mapping[int, Stay], number: int, there: Mapping[int, Stay]) -> bool:
+    """Return whether a number of another area does not count: nobody has it there, or they came from here."""
+    if number not in there:
+        return True
+    return own in in_area and (in_area[own].first_seen, own) <= (there[number].first_seen, number)

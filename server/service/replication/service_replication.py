@@ -134,11 +134,10 @@ class ServiceReplication:
         except TimeoutError:
             log.info("%d of %d services are there", 1 + len(self._bus.other_services), self._services)
         answers = await asyncio.to_thread(self._bus.query_states, _STATE_S)
-        states = [
-            state
-            for answer in answers
-            if (state := self._decode_state(answer)) is not None and not self._areas.is_other(state.record)
-        ]
+        answered = [state for answer in answers if (state := self._decode_state(answer)) is not None]
+        for state in answered:
+            self._areas.learn_numbers(state.record)
+        states = [state for state in answered if not self._areas.is_other(state.record)]
         if not states:
             return
         state = min(states, key=lambda state: state.record.rank)
@@ -294,6 +293,7 @@ class ServiceReplication:
             unbroken_since=self._unbroken_since,
             cameras=snapshots,
             in_area=self._areas.present(),
+            next_numbers=self._areas.next_numbers,
             deletions=self._deletions,
         )
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from bestview import FloorAreas
+from bestview import FloorAreas, to_ground
 
 SIZE = (640, 360)
 
@@ -79,3 +79,22 @@ def test_more_areas_than_calibrated_cameras_are_refused() -> None:
     homographies = {"a": camera_at(0, 0, 0.0), "b": None}
     with pytest.raises(ValueError, match="2 areas need as many calibrated cameras at least, but there are 1"):
         FloorAreas(homographies, dict.fromkeys(homographies, SIZE), 2)
+
+
+def test_cameras_that_see_the_same_cannot_be_divided() -> None:
+    homographies = dict.fromkeys("abcd", camera_at(0, 0, 0.0))
+    with pytest.raises(ValueError, match="too alike to divide the floor into 2 areas"):
+        FloorAreas(homographies, dict.fromkeys(homographies, SIZE), 2)
+
+
+def test_everything_that_a_camera_sees_is_on_some_floor() -> None:
+    homographies = {"west": camera_at(0, 0, np.pi), "east": camera_at(100, 0, 0.0)}
+    areas = FloorAreas(homographies, dict.fromkeys(homographies, SIZE), 2)
+    edges = np.array([[0.0, 360.0], [320.0, 360.0], [640.0, 360.0], [0.0, 120.0], [640.0, 120.0]])
+    for camera in homographies.values():
+        for x, y in to_ground(camera, edges).tolist():
+            floors = [areas.floor_of(area) for area in range(2)]
+            assert any(
+                least_x <= x <= most_x and least_y <= y <= most_y
+                for least_x, least_y, most_x, most_y in floors
+            )

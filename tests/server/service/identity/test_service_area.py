@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from typing import Any
 
 import aiohttp
@@ -18,7 +18,7 @@ from server.messaging.messages import CameraTracks
 from server.messaging.observations import FrameObservations, unpack_observations
 from server.messaging.packed_arrays import pack_detections, pack_histograms
 from server.service.identity.service_area import ServiceArea, area_to_take_in
-from server.service.identity.sharding import PeopleOfArea, TracksOfPeople
+from server.service.identity.sharding import OtherArea, PeopleOfArea, TracksOfPeople
 from server.service.service import BestViewService
 from server.system.errors import UserError
 
@@ -76,29 +76,60 @@ def test_hidden_people_and_those_of_uncalibrated_cameras_are_taken_in() -> None:
     assert len(area.near(epoch_of(0, seen("c1", 0, 600.0))).tracks["c1"].tracks) == 1
 
 
+class TwoAreas:
+    """The people of both areas, which hear from each other an epoch later."""
+
+    def __init__(self, *, floor: bool = True) -> None:
+        self.areas = [
+            PeopleOfArea(
+                share(index, floor=floor),
+                ServiceArea(share(index, floor=floor), dict.fromkeys(CAMERAS, GROUND), SIZE),
+                25.0,
+            )
+            for index in (0, 1)
+        ]
+
+    def step(self, frame: int, seen: Sequence[CameraTracks]) -> list[int]:
+        """Show both services person 7 in some cameras; return in which areas the person is."""
+        for index, area in enumerate(self.areas):
+            other = {
+                number: OtherArea(1 - index, last) for number, last in self.areas[1 - index].present.items()
+            }
+            area.update([TracksOfPeople(message, [7]) for message in seen], frame)
+            area.hear(other)
+        return [index for index, area in enumerate(self.areas) if area.own([7], {})]
+
+
+def test_who_walks_into_another_area_is_in_both_and_then_there() -> None:
+    both = TwoAreas()
+
+    def at_place(frame: int, x: float) -> list[int]:
+        return both.step(frame, [seen(camera, 0, x) for camera in CAMERAS])
+
+    assert at_place(0, 50.0) == [0]
+    assert at_place(5, 150.0) == [0, 1]
+    assert at_place(50, 150.0) == [0, 1]
+    assert at_place(60, 150.0) == [1]
+    assert both.areas[0].others([7], {}) == [7]
+    assert [area.share_of(7) for area in both.areas] == [1, 1]
+
+
 @pytest.mark.parametrize("floor", [True, False])
-def test_who_walks_into_another_area_is_in_both_and_then_there(floor: bool) -> None:
-    west, east = (
-        PeopleOfArea(
-            share(index, floor=floor), ServiceArea(share(index), dict.fromkeys(CAMERAS, GROUND), SIZE), 25.0
-        )
-        for index in (0, 1)
-    )
+def test_whom_both_lose_sight_of_stays_in_one_area(floor: bool) -> None:
+    both = TwoAreas(floor=floor)
+    border = [seen("c0", 0, 99.0), seen("c1", 0, 101.0)]
+    assert all(both.step(frame, border) for frame in range(0, 50, 5))
+    found = [both.step(frame, []) for frame in range(50, 500, 5)]
+    assert all(found)
+    assert len(found[-1]) == 1
 
-    def step(frame: int, x: float) -> tuple[list[int], list[int]]:
-        tracks = [TracksOfPeople(seen(camera, 0, x), [7]) for camera in CAMERAS]
-        for area, other in ((west, 1), (east, 0)):
-            area.update(tracks, frame)
-            area.hear(dict.fromkeys((east if other else west).present, other))
-        return west.own([7], {}), east.own([7], {})
 
-    assert step(0, 50.0) == ([7], [])
-    assert (west.share_of(7), east.share_of(7)) == (0, 0)
-    assert step(5, 150.0) == ([7], [7])
-    assert step(50, 150.0) == ([7], [7])
-    assert step(60, 150.0) == ([], [7])
-    assert west.others([7], {}) == [7]
-    assert (west.share_of(7), east.share_of(7)) == (1, 1)
+def test_without_floors_who_is_seen_by_a_camera_of_each_area_ends_in_one() -> None:
+    both = TwoAreas(floor=False)
+    border = [seen(camera, 0, 100.0) for camera in CAMERAS]
+    found = [both.step(frame, border) for frame in range(0, 200, 5)]
+    assert all(found)
+    assert len(found[-1]) == 1
 
 
 def test_nobody_leaves_an_area_before_another_has_them() -> None:
@@ -158,6 +189,13 @@ def test_areas_that_do_not_fit_are_refused(of: int, areas: list[dict[str, Any]],
         small_config(view={"share": {"of": of, "areas": areas}})
 
 
+def test_a_rule_about_cameras_that_no_area_has_together_is_refused() -> None:
+    areas = [{"cameras": ["c0"]}, {"cameras": ["c1"]}]
+    rule = {"id": "door", "kind": "entered", "cameras": ["c0", "c1"]}
+    with pytest.raises(UserError, match="rules: door: no area has all of its cameras"):
+        small_config(view={"share": {"of": 2, "areas": areas}}, rules=[rule])
+
+
 @pytest.fixture
 async def west_service() -> AsyncIterator[str]:
     """Serve the first of two areas."""
@@ -168,7 +206,7 @@ async def west_service() -> AsyncIterator[str]:
         service.feed(epoch, {"c0": {1: SMALL}})
     area = service.decider.people.of_service
     assert isinstance(area, PeopleOfArea)
-    area.hear({2: 1})
+    area.hear({2: OtherArea(1, 0)})
     async with serving(make_app(BestViewService(service)), HttpSettings(port=0)) as port:
         yield f"http://127.0.0.1:{port}"
     service.close()

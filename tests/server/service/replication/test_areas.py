@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 
 from benchmarks.scaling.divided_hall import agreement, divide, observe, run_divided
 from benchmarks.scaling.simulated_hall import SimulatedHall
+from fakes.service.scripted_cameras import LARGE, SMALL, FedService, TrackNumbers, small_config
+from server.messaging.camera_identity_snapshot import CameraIdentitySnapshot, PersonSnapshot
+from server.messaging.service_record import ServiceRecord, Stay
+from server.service.replication.areas import AreaAgreement
 
 
 @pytest.fixture(scope="module")
@@ -29,3 +35,58 @@ def test_areas_divide_a_halls_cameras(hall: SimulatedHall) -> None:
     areas = divide(hall, 4)
     assert sorted(camera for area in areas for camera in area["cameras"]) == hall.ids
     assert all(not set(area["cameras"]) & set(area["also"]) for area in areas)
+
+
+class TestAgreement:
+    """What a service takes over from another area's record that arrives one epoch later."""
+
+    @staticmethod
+    def record(service: int, pulse: int, tracks: dict[int, int], in_area: dict[int, int]) -> ServiceRecord:
+        """Return a record of tracks of the shared camera c1, by number, and since when people are there."""
+        snapshot = CameraIdentitySnapshot(
+            pulse=pulse,
+            boot=1,
+            next_number=20,
+            numbered_since=0.0,
+            people=[PersonSnapshot(number=number, tracks=[track]) for track, number in tracks.items()],
+        )
+        return ServiceRecord(
+            service=service,
+            pulse=pulse,
+            unbroken_since=0,
+            cameras={"c1": snapshot},
+            in_area={number: Stay(first_seen=since, here=pulse) for number, since in in_area.items()},
+            next_numbers=[600, 31],
+        )
+
+    @pytest.fixture
+    def service(self) -> Iterator[FedService]:
+        """The service of the first of two areas, which c1 sees as well."""
+        areas = [{"cameras": ["c0"], "also": ["c1"]}, {"cameras": ["c1"]}]
+        service = FedService(small_config(view={"share": {"of": 2, "areas": areas}}).of_service())
+        service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
+        service.connect_cameras("c0", "c1")
+        for epoch in range(4):
+            service.feed(epoch, {"c0": {1: SMALL}, "c1": {1: SMALL, 2: LARGE}})
+        yield service
+        service.close()
+
+    def test_a_number_that_somebody_else_has_here_is_not_taken(self, service: FedService) -> None:
+        people = service.decider.people
+        agreement = AreaAgreement(service.config.view.share, people)
+        for pulse in range(20, 60, 5):
+            there = self.record(1, pulse, {2: 1}, {1: 0})
+            agreement.receive(there)
+            assert agreement.step({pulse: self.record(0, pulse, {2: 2}, {1: 3})}, [there]) == 0
+        assert {1, 2} <= people.registry.first_seen.keys()
+
+    def test_numbers_that_another_service_remembers_are_not_assigned_again(
+        self, service: FedService, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        people = service.decider.people
+        reserved: list[int] = []
+        monkeypatch.setattr(people, "reserve_numbers_below", reserved.append)
+        agreement = AreaAgreement(service.config.view.share, people)
+        agreement.receive(self.record(1, 20, {}, {}))
+        assert agreement.next_numbers[1] == 31
+        assert reserved == [600]
