@@ -139,7 +139,10 @@ class DeletionService:
     def _follow(self, deleted: DeletedPerson) -> None:
         """Carry out a deletion of another service."""
         if deleted.numbers_since == _since(self._pipeline):
-            self._forget(deleted.numbers)
+            # In another area the person may have had other numbers before.
+            numbers = sorted(self._with_merged(deleted.numbers))
+            deleted = msgspec.structs.replace(deleted, numbers=numbers)
+            self._forget(numbers)
         self._start(self._complete_followed(deleted))
 
     def _start(self, work: Coroutine[Any, Any, None]) -> asyncio.Task[None]:

@@ -230,9 +230,13 @@ class ServiceReplication:
                 )
 
     def _follow_numbering(self, record: ServiceRecord) -> None:
-        """Count the numbers from when those of another service began; between areas, from the latest."""
+        """Count the numbers from when those of another service began.
+
+        Between areas it is the earliest: none assigns a number that another one remembers.
+        """
         since = max((snapshot.numbered_since for snapshot in record.cameras.values()), default=0.0)
-        if since > (self._of_cameras.numbers_since if self._areas.is_other(record) else 0.0):
+        is_later = since >= self._of_cameras.numbers_since and self._areas.is_other(record)
+        if since > 0.0 and not is_later:
             self._of_cameras.follow_numbering(since)
 
     def _follow(self, found: Disagreements) -> None:

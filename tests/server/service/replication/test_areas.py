@@ -41,13 +41,15 @@ class TestAgreement:
     """What a service takes over from another area's record that arrives one epoch later."""
 
     @staticmethod
-    def record(service: int, pulse: int, tracks: dict[int, int], in_area: dict[int, int]) -> ServiceRecord:
+    def record(
+        service: int, pulse: int, tracks: dict[int, int], in_area: dict[int, int], since: float = 0.0
+    ) -> ServiceRecord:
         """Return a record of tracks of the shared camera c1, by number, and since when people are there."""
         snapshot = CameraIdentitySnapshot(
             pulse=pulse,
             boot=1,
             next_number=20,
-            numbered_since=0.0,
+            numbered_since=since,
             people=[PersonSnapshot(number=number, tracks=[track]) for track, number in tracks.items()],
         )
         return ServiceRecord(
@@ -90,3 +92,11 @@ class TestAgreement:
         agreement.receive(self.record(1, 20, {}, {}))
         assert agreement.next_numbers[1] == 31
         assert reserved == [600]
+
+    @pytest.mark.parametrize(("later_s", "followed"), [(-5.0, True), (5.0, False)])
+    def test_numbers_count_from_when_those_of_the_first_area_began(
+        self, service: FedService, later_s: float, followed: bool
+    ) -> None:
+        own = service.state_replication.numbers_since
+        service.replication._follow_numbering(self.record(1, 20, {}, {}, own + later_s))
+        assert (service.state_replication.numbers_since < own) is followed
