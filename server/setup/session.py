@@ -5,10 +5,12 @@ from __future__ import annotations
 import asyncio
 import itertools
 from collections.abc import Awaitable, Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
 
+from server.config.loader import check_section
+from server.config.sections import SiteSettings
 from server.setup import discovery
 from server.setup.camera_address import CameraAddress, CameraAddresses, check_name, free_name, parse_address
 from server.setup.discovery import FoundCamera
@@ -244,6 +246,7 @@ class SetupSession:
         """
         if not self.cameras:
             raise UserError("add a camera first")
+        check_section(SiteSettings, {"name": name, **asdict(chosen)}, "site")
         cameras = [camera.as_new(camera.name, chosen) for camera in self.cameras]
         self.kept = write_site(NewSite(name, chosen, cameras), self.path)
         self.written.set()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from contextlib import closing
 from pathlib import Path
@@ -14,11 +15,12 @@ from fakes.media.rtsp_camera import RtspCamera
 from server.camera.passthrough.compatibility import required_format
 from server.camera.passthrough.stream_source import check_stream
 from server.config.loader import load_config
-from server.setup.camera_address import parse_addresses
+from server.setup.camera_address import parse_address, parse_addresses
 from server.setup.own_video import NOT_COMPARED, OwnVideo, compare_own_video
 from server.setup.proposal import SiteProposal
-from server.setup.session import SetupSession
+from server.setup.session import SetupSession, TriedCamera, TriedStream
 from server.setup.trial_messages import StreamTrial
+from server.system.errors import UserError
 
 SITE = SiteProposal(25.0, 1280, 720)
 FITTING = StreamTrial(width=1280, height=720, fps=25.0, codec="h264", gop=10)
@@ -64,3 +66,12 @@ async def test_a_camera_whose_video_fits_passes_through_the_site_that_is_written
     session.path.write_text(re.sub(r"^( *)#(?=\w)", r"\1", text, flags=re.MULTILINE))
     config = load_config(session.path)
     assert (config.camera("door").passthrough, config.encode.parameters) == ("auto", "own")
+
+
+@pytest.mark.parametrize("fps", [0.0, -25.0, math.inf, math.nan])
+def test_a_rate_that_no_site_can_have_is_one_line(tmp_path: Path, fps: float) -> None:
+    stream = TriedStream(parse_address("rtsp://10.0.0.1/"), FITTING)
+    session = SetupSession(tmp_path / "site.yaml", cameras=[TriedCamera(1, "door", stream)])
+    with pytest.raises(UserError, match=r"^site: fps: [^\n]*$"):
+        session.write("hall", SiteProposal(fps, 1280, 720))
+    assert list(tmp_path.iterdir()) == []
