@@ -37,8 +37,10 @@ def report_refusal(reason: str) -> None:
     """Report to the supervisor, if there is one, why this process refuses to start."""
     name = os.environ.get(REFUSAL_VARIABLE)
     if name is not None and is_owned_by_this_user(Path(name).parent):
+        draft = Path(f"{name}.{os.getpid()}")  # several processes may refuse at a time
         with contextlib.suppress(OSError):
-            Path(name).write_text(reason, encoding="utf-8")
+            draft.write_text(reason, encoding="utf-8", errors="backslashreplace")
+            draft.replace(name)
 
 
 @dataclass(frozen=True, slots=True)
