@@ -9,7 +9,7 @@ import os
 import signal
 import sys
 from importlib.metadata import version as version_of
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -120,17 +120,20 @@ def main() -> None:
 def _fail(error: Exception) -> None:
     """Print a one-line error and exit; re-raise bugs."""
     if isinstance(error, UserError):
-        report_error(str(error))
-        report_refusal(str(error))
-        sys.exit(error.code)
+        _refuse(str(error), error.code)
     if isinstance(error, BrokenPipeError):  # the reader of the output has exited, as in `… | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(0)
     if isinstance(error, OSError) and error.filename is not None and error.errno in _PATH_ERRORS:
         # An inaccessible path.
-        report_error(located_reason_of(error))
-        sys.exit(_BAD_INPUT)
+        _refuse(located_reason_of(error), _BAD_INPUT)
     raise error
+
+
+def _refuse(reason: str, code: int) -> NoReturn:
+    report_error(reason)
+    report_refusal(reason)
+    sys.exit(code)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import contextlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from server.system.private_files import is_owned_by_this_user
@@ -43,37 +43,44 @@ def report_refusal(reason: str) -> None:
             draft.replace(name)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class StartupPipe:
     """A pipe that reaches its end when a process has loaded or died.
 
     Attributes:
         read_end: the supervisor's end.
         write_end: the end that the process inherits and closes.
+        ended_at: when it has reached its end, by the event loop's clock; None: it has not yet.
     """
 
     read_end: int
     write_end: int
+    ended_at: float | None = None
+    _ended: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def end(self) -> None:
+        """Take note that all write ends are closed."""
+        loop = asyncio.get_running_loop()
+        loop.remove_reader(self.read_end)
+        self.ended_at = loop.time()
+        self._ended.set()
 
     async def ended(self, within_s: float) -> None:
         """Wait until all write ends are closed, at most ``within_s`` seconds."""
-        ended = asyncio.Event()
-        loop = asyncio.get_running_loop()
-        loop.add_reader(self.read_end, ended.set)
-        try:
-            # Not wait_for: up to Python 3.11 it swallows a cancellation that comes as it completes.
-            with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(within_s):
-                    await ended.wait()
-        finally:
-            loop.remove_reader(self.read_end)
+        # Not wait_for: up to Python 3.11 it swallows a cancellation that comes as it completes.
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(within_s):
+                await self._ended.wait()
 
 
 @contextmanager
 def open_startup_pipe() -> Iterator[StartupPipe]:
-    """Open a pipe; the context closes the read end, the caller the write end."""
+    """Open a pipe; the context watches and closes the read end, the caller closes the write end."""
     read_end, write_end = os.pipe()
+    pipe, loop = StartupPipe(read_end, write_end), asyncio.get_running_loop()
+    loop.add_reader(read_end, pipe.end)
     try:
-        yield StartupPipe(read_end, write_end)
+        yield pipe
     finally:
+        loop.remove_reader(read_end)
         os.close(read_end)

@@ -15,7 +15,7 @@ from expbackoff import Backoff
 from logthrottle import LogThrottle
 from server.config.site_config import Config
 from server.supervisor.shutdown import EXIT_FINISHED, EXIT_RESTART, SUPERVISED_VARIABLE
-from server.supervisor.startup_signal import STARTED_FD_VARIABLE, open_startup_pipe
+from server.supervisor.startup_signal import STARTED_FD_VARIABLE, StartupPipe, open_startup_pipe
 from server.system.child_process import start_cli_command
 from server.system.errors import UserError
 from server.system.processors import available_processors
@@ -25,6 +25,8 @@ log = logging.getLogger(__name__)
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.2, 10.0
 _STABLE_S = 10.0
 """Running time after which a process is restarted without backoff again."""
+_REFUSAL_S = 60.0
+"""Time since a process has loaded in which it may refuse its input: it first opens and checks its source."""
 _STARTUP_TIMEOUT_S = 10.0
 """How long a loading process delays the start of others; it may hang."""
 _KILL_AFTER_S = 1.6
@@ -119,10 +121,12 @@ class Supervisor:
         for prerequisite in child.awaits:
             await prerequisite.started.wait()
         while True:
-            async with self._load_slots if child.awaits else contextlib.nullcontext():
-                started = loop.time()
-                process = await self._start(child)
-            code = await process.wait()
+            with open_startup_pipe() as pipe:
+                async with self._load_slots if child.awaits else contextlib.nullcontext():
+                    started = loop.time()
+                    process = await self._start(child, pipe)
+                code = await process.wait()
+            has_run = self._has_run or child.restarts > 0 or _seconds_since(pipe.ended_at) > _REFUSAL_S
             if code == EXIT_RESTART:
                 self.restart_wanted = True
                 child.done.set()
@@ -131,7 +135,7 @@ class Supervisor:
                 log.info("%s has ended", child.name)
                 child.done.set()
                 return
-            if code == UserError.code and child.restarts == 0 and not self._has_run:
+            if code == UserError.code and not has_run:
                 raise UserError(f"{child.name} could not start")
             if loop.time() - started > _STABLE_S:
                 backoff.reset()
@@ -141,20 +145,19 @@ class Supervisor:
             await asyncio.sleep(pause)
             child.restarts += 1
 
-    async def _start(self, child: Child) -> asyncio.subprocess.Process:
+    async def _start(self, child: Child, pipe: StartupPipe) -> asyncio.subprocess.Process:
         """Start a process; return it once it has loaded, has died, or has timed out."""
-        with open_startup_pipe() as pipe:
-            try:
-                self._before_start()
-                process = child.process = await start_cli_command(
-                    self._arguments(child),
-                    {**self._environment, STARTED_FD_VARIABLE: str(pipe.write_end)},
-                    inherited=(pipe.write_end,),
-                    niceness=child.niceness,
-                )
-            finally:
-                os.close(pipe.write_end)
-            await pipe.ended(_STARTUP_TIMEOUT_S)
+        try:
+            self._before_start()
+            process = child.process = await start_cli_command(
+                self._arguments(child),
+                {**self._environment, STARTED_FD_VARIABLE: str(pipe.write_end)},
+                inherited=(pipe.write_end,),
+                niceness=child.niceness,
+            )
+        finally:
+            os.close(pipe.write_end)
+        await pipe.ended(_STARTUP_TIMEOUT_S)
         child.started.set()
         return process
 
@@ -185,6 +188,10 @@ class Supervisor:
                 if process.returncode is None:
                     process.kill()
             await asyncio.wait(late)
+
+
+def _seconds_since(moment: float | None) -> float:
+    return 0.0 if moment is None else asyncio.get_running_loop().time() - moment
 
 
 def _cause(code: int) -> str:

@@ -149,6 +149,27 @@ async def test_a_process_that_refuses_its_input_at_the_start_ends_the_site(machi
     assert all(process.returncode is not None for process in processes.values())
 
 
+async def test_a_process_that_has_run_for_long_is_restarted_even_if_it_refuses_its_input(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervisor, "_REFUSAL_S", -1.0)  # any time since it has loaded is long
+    machine.run()
+    processes = await machine.processes(4)
+    processes["c0"].end(2)
+    assert set(await machine.processes(1)) == {"c0"}
+
+
+async def test_a_process_that_loads_for_long_may_still_refuse_its_input(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(supervisor, "_STARTUP_TIMEOUT_S", 0.01)
+    machine.loads_at_once = False
+    task = machine.run()
+    (await machine.processes(4))["c1"].end(2)
+    with pytest.raises(UserError, match="c1 could not start"):
+        await task
+
+
 async def test_a_process_that_ran_before_is_restarted_even_if_it_refuses_its_input(machine: Machine) -> None:
     machine.run()
     processes = await machine.processes(4)
