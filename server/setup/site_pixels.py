@@ -47,7 +47,7 @@ def find_change(before: Size, after: Size, pictures: Collection[Size]) -> Pictur
     Args:
         before: width and height.
         after: width and height.
-        pictures: sizes of the cameras' own pictures, as far as they are known.
+        pictures: sizes of all cameras' own pictures; needed only if the shape changes.
     """
     if _fills(before, after):
         return _change(before, before, after)
@@ -59,7 +59,7 @@ def find_change(before: Size, after: Size, pictures: Collection[Size]) -> Pictur
 
 
 def moved_settings(
-    config: Config, content: Mapping[str, Any], after: Size, pictures: Collection[Size]
+    config: Config, content: Mapping[str, Any], after: Size, pictures: Mapping[str, Size]
 ) -> dict[str, dict[str, Any]]:
     """Return the values that settings of a configuration get with another size of the site, by section.
 
@@ -67,7 +67,7 @@ def moved_settings(
         config: the configuration with its present size.
         content: of its file: only what is written there changes.
         after: the new width and height.
-        pictures: sizes of the cameras' own pictures, as far as they are known.
+        pictures: sizes of the cameras' own pictures by camera, as far as they are known.
 
     Raises:
         UserError: they cannot follow.
@@ -78,11 +78,18 @@ def moved_settings(
     costs = {name: written[name] for name in _pixel_costs(config.track.costs) if written.get(name)}
     if not areas and not costs:
         return {}
-    change = find_change(config.site.size, after, pictures)
-    if change is None:
-        names = [*(["detect.ignore"] if areas else []), *(f"track.costs.{name}" for name in costs)]
+    names = ", ".join([*(["detect.ignore"] if areas else []), *(f"track.costs.{name}" for name in costs)])
+    unknown = [camera for camera in config.camera_ids if camera not in pictures]
+    if unknown and not _fills(config.site.size, after):
         raise UserError(
-            f"{', '.join(names)}: in pixels of the site's picture, in which not all cameras' pictures will "
+            f"{names}: in pixels of the site's picture; how they move is not known without the picture of "
+            f"camera {', '.join(unknown)}: keep its shape, or wait until the camera sends"
+        )
+    sizes = [pictures[camera] for camera in config.camera_ids if camera in pictures]
+    change = find_change(config.site.size, after, sizes)
+    if change is None:
+        raise UserError(
+            f"{names}: in pixels of the site's picture, in which not all cameras' pictures will "
             "lie alike: keep its shape, or remove this first (areas: to each camera's own ignore)"
         )
     moved: dict[str, dict[str, Any]] = {}

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from server.config.loader import check_section, load_config, read_content
 from server.config.sections import SiteSettings
@@ -44,7 +45,10 @@ def read_choice(path: Path) -> StreamFormatChoice:
 
 
 def save_choice(
-    path: Path, choice: StreamFormatChoice, digest: str | None = None, pictures: Collection[Size] = ()
+    path: Path,
+    choice: StreamFormatChoice,
+    digest: str | None = None,
+    pictures: Mapping[str, Size] = MappingProxyType({}),
 ) -> None:
     """Change the settings in a configuration file, and those that follow the size; the earlier file is kept.
 
@@ -52,7 +56,7 @@ def save_choice(
         path: the file.
         choice: the new settings.
         digest: of the settings that the change is based on; None: it is made whatever they are.
-        pictures: sizes of the cameras' own pictures, as far as they are known.
+        pictures: sizes of the cameras' own pictures by camera, as far as they are known.
 
     Raises:
         UserError: the settings have changed meanwhile, the file or what it would become is invalid, a

@@ -41,7 +41,7 @@ async def put_site_settings(request: web.Request) -> web.Response:
     """Change the site's name, rate and size in the configuration file; a restart brings them into force."""
     wanted = await read_json(request, SiteChange)
     choice = StreamFormatChoice(wanted.name, wanted.fps, wanted.width, wanted.height)
-    pictures = picture_sizes(request).values()
+    pictures = picture_sizes(request)
     return await _answer(
         request, partial(save_choice, choice=choice, digest=wanted.digest, pictures=pictures)
     )

@@ -157,15 +157,29 @@ def test_what_a_camera_shows_in_an_area_is_the_same_before_and_after(
         np.testing.assert_allclose(seen, shown, atol=2.0 * max(picture) / max(after))
 
 
-@pytest.mark.parametrize("pictures", [[], [(1920, 1080), (640, 480)]])
-def test_what_cannot_follow_is_one_line_and_changes_nothing(path: Path, pictures: list[Size]) -> None:
-    with pytest.raises(
-        UserError, match=r"^detect\.ignore, track\.costs\.displacement, .*: keep its shape"
-    ) as refused:
+@pytest.mark.parametrize(
+    ("pictures", "reason"),
+    [
+        ({"c0": (1920, 1080), "c1": (640, 480)}, "not all cameras' pictures will lie alike"),
+        ({"c0": (1920, 1080)}, "the picture of camera c1"),  # it is away; it may have another shape
+        ({}, "the picture of camera c0, c1"),
+    ],
+)
+def test_what_cannot_follow_is_one_line_and_changes_nothing(
+    path: Path, pictures: dict[str, Size], reason: str
+) -> None:
+    line = rf"^detect\.ignore, track\.costs\.displacement, .*{reason}: keep its shape"
+    with pytest.raises(UserError, match=line) as refused:
         save_choice(path, StreamFormatChoice("hall", 25.0, 640, 480), None, pictures)
     assert len(str(refused.value).splitlines()) == 1
     assert path.read_text() == TEXT
     save_choice(path, StreamFormatChoice("shop", 12.5, 640, 360), None, pictures)  # the size stays
+
+
+def test_another_shape_is_followed_where_all_cameras_sizes_are_known(path: Path) -> None:
+    sizes = dict.fromkeys(("c0", "c1", "removed"), (1920, 1080)) | {"removed": (640, 480)}
+    save_choice(path, StreamFormatChoice("hall", 25.0, 640, 480), None, sizes)
+    assert load_config(path).detect.ignore == (((0, 360), (640, 360), (640, 420.5)),)
 
 
 @pytest.mark.parametrize(
