@@ -134,9 +134,11 @@ class _PictureOrder:
 
     @property
     def gop(self) -> int:
-        """Pictures of a GOP, but for the first, which may be cut short for a new client; 0: they differ."""
-        keys = self._keys[1:] if len(self._keys) > 2 else self._keys  # noqa: PLR2004 — one GOP has two
-        lengths = {after - before for before, after in itertools.pairwise(keys)}
+        """Pictures of a GOP, but for the first, which may be cut short for a new client.
+
+        0: they differ, or none was seen whole.
+        """
+        lengths = {after - before for before, after in itertools.pairwise(self._keys[1:])}
         last = self._count - self._keys[-1] if self._keys else 0
         length = lengths.pop() if len(lengths) == 1 else 0
         return length if last <= length else 0

@@ -19,7 +19,8 @@ from server.setup.camera_address import parse_address, parse_addresses
 from server.setup.own_video import NOT_COMPARED, OwnVideo, compare_own_video
 from server.setup.proposal import SiteProposal
 from server.setup.session import SetupSession, TriedCamera, TriedStream
-from server.setup.trial_messages import StreamTrial
+from server.setup.stream_trial import run_trial
+from server.setup.trial_messages import StreamRequest, StreamTrial
 from server.system.errors import UserError
 
 SITE = SiteProposal(25.0, 1280, 720)
@@ -46,13 +47,13 @@ def test_what_a_camera_must_be_set_to_is_named(change: dict[str, object], expect
     assert compare_own_video(msgspec.structs.replace(FITTING, **change), SITE) == expected
 
 
-@pytest.mark.parametrize(("gop", "fits"), [(10, True), (20, False)])
+@pytest.mark.parametrize(("gop", "fits"), [(10, True), (12, False)])
 async def test_a_camera_whose_video_fits_passes_through_the_site_that_is_written(
     tmp_path: Path, gop: int, *, fits: bool
 ) -> None:
     session = SetupSession(tmp_path / "site.yaml")
-    units = encoded((64, 48), "superfast", 80, gop=gop)
-    gops = [units[at : at + gop] for at in range(0, 80, gop)]
+    units = encoded((64, 48), "superfast", 120, gop=gop)
+    gops = [units[at : at + gop] for at in range(0, 120, gop)]
     with closing(RtspCamera(gops, 25.0, live=True)) as stream:
         await session.add(parse_addresses(stream.url), "door")
         session.write("hall", session.proposal)
@@ -62,10 +63,18 @@ async def test_a_camera_whose_video_fits_passes_through_the_site_that_is_written
         if fits:
             check_stream(stream.url, config.camera("door").options, required_format(config))
         else:
-            assert "of 10 frames, not 20\n" in text
+            assert "of 10 frames, not 12\n" in text
     session.path.write_text(re.sub(r"^( *)#(?=\w)", r"\1", text, flags=re.MULTILINE))
     config = load_config(session.path)
     assert (config.camera("door").passthrough, config.encode.parameters) == ("auto", "own")
+
+
+def test_a_first_gop_cut_short_for_a_new_client_tells_nothing_of_the_others() -> None:
+    units = encoded((64, 48), "superfast", 100, gop=50)
+    with closing(RtspCamera([units[:30], units[50:70]], 25.0)) as stream:
+        stream.gop_limit = 2
+        trial = run_trial(StreamRequest(stream.url, {}))
+    assert (trial.codec, trial.gop) == ("h264", 0)
 
 
 @pytest.mark.parametrize("fps", [0.0, -25.0, math.inf, math.nan])
