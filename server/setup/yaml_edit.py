@@ -66,18 +66,26 @@ def changed_values_text(path: Path, sections: Mapping[str, Mapping[str, Any]]) -
 
 
 def _with_values(text: str, section: str, values: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
-    lines = text.splitlines(keepends=True)
-    span = _span(lines, section) or range(0)
-    for key, value in _leaves(values):
-        line = re.compile(rf"([ \t]+{key}:)[^#\n]*?([ \t]+#.*)?\n?")
-        for number in span[1:]:
-            if found := line.fullmatch(lines[number]):
-                lines[number] = f"{found[1]} {dump_yaml_inline(value)}{found[2] or ''}\n"
-    changed = "".join(lines)
     with contextlib.suppress(yaml.YAMLError):
+        changed = text
+        for place, value in _leaves(values, (section,)):
+            changed = _with_value(changed, place, value)
         if yaml.safe_load(changed) == wanted:
             return changed
     return _checked(_replaced(text, section, dump_yaml({section: wanted[section]})), wanted)
+
+
+def _with_value(text: str, place: Sequence[str], value: Any) -> str:
+    """Return a text with another value of a setting that stands in it, in its place."""
+    node = yaml.compose(text, Loader=yaml.SafeLoader)
+    for name in place:
+        pairs = node.value if isinstance(node, yaml.MappingNode) else []
+        node = next((inner for key, inner in pairs if key.value == name), None)
+    if node is None:
+        return text
+    start, end = node.start_mark.index, node.end_mark.index
+    space = " " if start == end else ""  # there is no value
+    return f"{text[:start]}{space}{dump_yaml_inline(value)}{text[end:]}"
 
 
 def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
@@ -89,13 +97,13 @@ def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
     return {**old, **inner}
 
 
-def _leaves(values: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
-    """Yield the settings that are no sections."""
+def _leaves(values: Mapping[str, Any], place: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Yield the settings that are no sections, each with the names that lead to it."""
     for key, value in values.items():
         if isinstance(value, Mapping):
-            yield from _leaves(value)
+            yield from _leaves(value, (*place, key))
         else:
-            yield key, value
+            yield (*place, key), value
 
 
 def _checked(text: str, wanted: Mapping[str, Any]) -> str:

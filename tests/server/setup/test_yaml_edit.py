@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from fakes.paths import CONFIGS
 from server.config.loader import load_config
 from server.setup.ground import apply_ground
-from server.setup.yaml_edit import changed_text
+from server.setup.yaml_edit import changed_text, changed_values_text
 from server.system.errors import UserError
 
 GROUND = json.dumps({"unit": "m", "homography": {"c0": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}})
@@ -71,6 +71,33 @@ def test_the_examples_keep_their_comments(tmp_path: Path, name: str) -> None:
     text = changed_text(write(tmp_path, example), "ground", "new.json")
     assert yaml.safe_load(text) == {**yaml.safe_load(example), "ground": "new.json"}
     assert text.count("#") >= example.count("#") - 2
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ('"a # b"   # the name', "'x # y'   # the name"),
+        ("'a: \"b\"'  # the name", "'x # y'  # the name"),
+        ("hall  # the name: a # b", "'x # y'  # the name: a # b"),
+        ("hall#1", "'x # y'"),
+        ("   # the name", "'x # y'    # the name"),
+    ],
+)
+def test_a_value_is_replaced_whole_and_its_comment_stays(tmp_path: Path, before: str, after: str) -> None:
+    text = "site:\n  width: 640\n  name: {}\n  # other\nrules: [{{name: a}}]\n"
+    path = write(tmp_path, text.format(before))
+    assert changed_values_text(path, {"site": {"name": "x # y"}}) == text.format(after)
+
+
+@pytest.mark.parametrize(
+    "site",
+    ["name: |\n    hall\n    b\n", "name: &n hall\n  other: *n\n", "name:\n    - a  # first\n", "other: 1\n"],
+)
+def test_a_value_in_any_style_is_replaced(tmp_path: Path, site: str) -> None:
+    text = f"# mine\nsite:\n  {site}view: {{name: b}}\n"
+    changed = changed_values_text(write(tmp_path, text), {"site": {"name": "x # y"}})
+    content = yaml.safe_load(text)
+    assert yaml.safe_load(changed) == {**content, "site": {**content["site"], "name": "x # y"}}
 
 
 KEYS = st.sampled_from(["site", "cameras", "view", "ground"])
