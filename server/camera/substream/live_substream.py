@@ -20,9 +20,9 @@ from server.system.address_redaction import redact_to_host
 
 log = logging.getLogger(__name__)
 
-_TOO_LARGE = (
-    "%s: pictures of this substream are so large that only %.1f s of them are kept, and those for a later "
-    "main stream may be missing: set it to a smaller size"
+_NOT_KEPT = (
+    "%s: pictures of this substream are so %s that only %.1f s of them are kept, and those for a later "
+    "main stream may be missing: set it to a %s"
 )
 _FIRST_PICTURE_S = 4.0
 """Seconds to wait for the first picture: its size decides at which size people are tracked."""
@@ -68,5 +68,7 @@ class LiveSubstream(StreamReader):
             self._pictures.put(BufferedPicture(picture, self._aspect, captured))
         if self._pictures.kept_s is not None and not self._has_warned:
             self._has_warned = True
-            log.warning(_TOO_LARGE, redact_to_host(self._url), self._pictures.kept_s)
+            many = self._pictures.is_too_many
+            how, wanted = ("many", "lower frame rate") if many else ("large", "smaller size")
+            log.warning(_NOT_KEPT, redact_to_host(self._url), how, self._pictures.kept_s, wanted)
         return bool(pictures)

@@ -66,6 +66,8 @@ class PictureBuffer:
         self._keep_s, self._tolerance_s, self._max_bytes = keep_s, tolerance_s, max_bytes
         self.kept_s: float | None = None
         """Seconds of pictures that fitted; None: all that are to be kept do."""
+        self.is_too_many = False
+        """Whether it was their number that did not fit, not their memory."""
         self._pictures: deque[BufferedPicture] = deque()
         self._bytes = 0
         self._open: deque[PictureRequest] = deque(maxlen=_MAX_REQUESTS)
@@ -89,11 +91,12 @@ class PictureBuffer:
         """Drop the oldest pictures that are too old, or do not fit."""
         while len(self._pictures) > 1:
             age = now - self._pictures[0].captured.arrival
-            is_full = len(self._pictures) > _MAX_PICTURES or self._bytes > self._max_bytes
+            is_too_large = self._bytes > self._max_bytes
+            is_full = is_too_large or len(self._pictures) > _MAX_PICTURES
             if not is_full and age <= self._keep_s:
                 return
             if is_full and age < self._keep_s:
-                self.kept_s = age
+                self.kept_s, self.is_too_many = age, not is_too_large
             self._bytes -= self._pictures.popleft().size_bytes
 
     def request(self, captured: CaptureTime) -> PictureRequest:

@@ -65,12 +65,21 @@ def test_pictures_are_bounded_by_their_memory_and_that_is_told() -> None:
     assert len(buffer._pictures) == 5
     assert buffer.kept_s is not None
     assert 5 < buffer.kept_s < 60
+    assert not buffer.is_too_many
     for _ in range(5):
         buffer.put(picture(now))  # small ones
     assert len(buffer._pictures) > 5, "the memory of those that went is free again"
     tiny = PictureBuffer(60.0, INTERVAL / 2, max_bytes=1)
     tiny.put(BufferedPicture(large, 1.0, CaptureTime(now)))
     assert tiny.wait(tiny.request(CaptureTime(now)), now) is not None
+
+
+def test_pictures_are_bounded_by_their_number_and_that_is_told() -> None:
+    buffer, now = PictureBuffer(60.0, INTERVAL / 2), time.monotonic()
+    for place in range(601):
+        buffer.put(picture(now - 10 + place / 100))
+    assert buffer.kept_s is not None
+    assert buffer.is_too_many
 
 
 def test_a_request_that_was_waited_for_in_vain_stays_answered_and_is_forgotten() -> None:
