@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from server.config.loader import check_section
 from server.config.sections import SiteSettings
@@ -33,6 +33,8 @@ MAX_CAMERAS = 64
 _TRIALS_AT_ONCE = 2
 """Trials that run at a time; each decodes video."""
 _MAX_WAITING = 16
+_MAX_FOUND = 1024
+"""Found cameras that are remembered, the latest."""
 _MAX_STREAMS = 4096
 """Offered streams that are remembered, the latest: a site may run for months."""
 Request = TypeVar("Request")
@@ -98,12 +100,13 @@ class SetupSession:
     """
 
     path: Path
-    found: list[FoundCamera] = field(default_factory=list)
     cameras: list[TriedCamera] = field(default_factory=list)
     kept: Path | None = None
     """Where the earlier file is, after writing."""
     written: asyncio.Event = field(default_factory=asyncio.Event)
     """Set when the configuration is written."""
+    _found: dict[tuple[str, int], FoundCamera] = field(default_factory=dict)
+    """Cameras that any search has found, by address and port: several operators may search."""
     _streams: dict[int, CameraAddress] = field(default_factory=dict)
     """Streams that cameras offered, by key, with their passwords."""
     _keys: itertools.count[int] = field(default_factory=lambda: itertools.count(1))
@@ -116,8 +119,13 @@ class SetupSession:
         Raises:
             UserError: there is no network.
         """
-        self.found = await discovery.discover(seconds)
-        return self.found
+        found = await discovery.discover(seconds)
+        for camera in found:
+            address = camera.host, camera.port
+            self._found.pop(address, None)  # the latest is last
+            self._found[address] = camera
+        _keep_latest(self._found, _MAX_FOUND)
+        return found
 
     async def profiles(
         self, host: str, port: int, user: str, password: str
@@ -127,18 +135,17 @@ class SetupSession:
         Raises:
             UserError: no such camera was found, or too many are asked.
         """
-        if not any((camera.host, camera.port) == (host, port) for camera in self.found):
+        camera = self._found.get((host, port))
+        if camera is None:
             raise UserError("no such camera was found; search again")
-        encrypted = next(one.encrypted for one in self.found if (one.host, one.port) == (host, port))
-        request = ProfilesRequest(host, port, user, password, encrypted)
+        request = ProfilesRequest(host, port, user, password, camera.encrypted)
         answer = await self._limited(list_profiles, request)
         keys = []
         for profile in answer.profiles:
             key = next(self._keys)
             self._streams[key] = parse_address(profile.address, user, password)
             keys.append(key)
-        while len(self._streams) > _MAX_STREAMS:
-            del self._streams[next(iter(self._streams))]
+        _keep_latest(self._streams, _MAX_STREAMS)
         return answer, keys
 
     def offered(self, source: int, substream: int | None = None) -> CameraAddresses:
@@ -250,3 +257,8 @@ class SetupSession:
         cameras = [camera.as_new(camera.name, chosen) for camera in self.cameras]
         self.kept = write_site(NewSite(name, chosen, cameras), self.path)
         self.written.set()
+
+
+def _keep_latest(entries: dict[Any, Any], most: int) -> None:
+    while len(entries) > most:
+        del entries[next(iter(entries))]

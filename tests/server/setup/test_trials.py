@@ -19,6 +19,7 @@ from fakes.setup.onvif_camera import FakeProfile, OnvifCamera, onvif_cameras
 from server.config.camera_password import fill_in_password
 from server.config.loader import load_config
 from server.setup.camera_address import parse_address, parse_addresses
+from server.setup.discovery import FoundCamera
 from server.setup.onvif_profiles import INSTALL, query_profiles, stream_address
 from server.setup.session import SetupSession
 from server.setup.stream_pair import propose_pair
@@ -67,6 +68,29 @@ async def test_a_found_camera_is_asked_tried_named_and_written(
     session.rename(tried.key, "door")
     session.write("hall", session.proposal)
     assert "rtsp://viewer:{password}@127.0.0.1" in session.path.read_text()
+
+
+async def test_what_one_operator_found_stays_when_another_searches(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = SetupSession(tmp_path / "site.yaml")
+    door, yard = (
+        OnvifCamera(name, [FakeProfile("main", "rtsp://127.0.0.1/live", 64, 48, 12)], LOGIN)
+        for name in ("door", "yard")
+    )
+    with onvif_cameras(door) as first, onvif_cameras(yard) as second:
+        found = list[FoundCamera]()
+        for targets in (first, second):
+            monkeypatch.setenv("MYVIEW_DISCOVERY", targets)
+            found += await session.discover(1.0)
+        assert [camera.name for camera in found] == ["door", "yard"]
+        for camera in found:
+            answer, _ = await session.profiles(camera.host, camera.port, *LOGIN)
+            assert [each.name for each in answer.profiles] == ["main"]
+        monkeypatch.setattr("server.setup.session._MAX_FOUND", 1)
+        await session.discover(1.0)
+        with pytest.raises(UserError, match="search again"):
+            await session.profiles(found[0].host, found[0].port, *LOGIN)
 
 
 def profile(name: str, width: int, height: int, codec: str = "H264") -> StreamProfile:
