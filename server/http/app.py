@@ -106,7 +106,7 @@ def make_app(
     authenticator = Authenticator(
         config.access.tokens,
         f"{config.site.name}_{config.view.share.index}",
-        numbered_since=lambda: service.people.numbered_since,
+        numbered_since=service.people.numbered_since,
     )
     app[ACCESS] = AccessControl(authenticator, service.people.current_number, config.access.blur)
     is_open = config.access.tokens is None and config.access.open_to_all

@@ -41,7 +41,8 @@ class Authenticator:
     """Finds the credential of a request and its current grant.
 
     ``service_name`` distinguishes the service from others on its machine; ``numbered_since`` returns the unix
-    time since which person numbers have kept their meaning; ``now`` is a monotonic clock in seconds.
+    time since which a person number has kept its meaning, infinite while that is unknown; ``now`` is a
+    monotonic clock in seconds.
     """
 
     def __init__(
@@ -49,7 +50,7 @@ class Authenticator:
         tokens: Path | None,
         service_name: str = "site",
         now: Callable[[], float] = time.monotonic,
-        numbered_since: Callable[[], float] = lambda: 0.0,
+        numbered_since: Callable[[int], float] = lambda _: 0.0,
     ) -> None:
         """Read the token file.
 
@@ -127,8 +128,16 @@ class Authenticator:
 
     def _void_reason(self, token: Token) -> VoidReason | None:
         """Return why a token for one person is void: person numbers have restarted since it was made."""
-        if token.object is None or token.made is None or token.made.timestamp() >= self._numbered_since():
+        if token.object is None or token.made is None:
             return None
+        since = self._numbered_since(token.object)
+        if token.made.timestamp() >= since:
+            return None
+        if math.isinf(since):
+            return (
+                f"the token {token.name!r} is for object {token.object}, whose number is of another site "
+                "that has not been heard: try again once it is up"
+            )
         return (
             f"person numbers have restarted since the token {token.name!r} was made, and object "
             f"{token.object} may be another person: make a new one"

@@ -169,10 +169,9 @@ class PeopleService:
             number, is_recovering=self._pipeline.state_replication.is_known_or_recoverable(number)
         )
 
-    @property
-    def numbered_since(self) -> float:
-        """Unix seconds since when numbers mean the same people."""
-        return self._pipeline.state_replication.numbers_since
+    def numbered_since(self, number: int) -> float:
+        """Return since when a number means the same person, unix seconds; infinite: unknown."""
+        return self._pipeline.other_sites.numbered_since(number)
 
     def view_selection_of(self, number: int, pulse: int | None = None) -> ViewSelection | None:
         """Return why a person's newest view was selected, or that at a pulse of the last minute.

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import secrets
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -177,6 +178,16 @@ class OtherSites:
             if self.sites[person.site].is_there(now) and not is_here:
                 found[number] = replace(person, number=number)
         return [person for _, person in sorted(found.items())]
+
+    def numbered_since(self, number: int) -> float:
+        """Return since when a number means one person, here and at its site; infinite: unknown."""
+        own, ids = self._of_cameras.numbers_since, self._config.sites.ids
+        if ids.has(number) or not own:
+            return own
+        index = (number - 1) % ids.step
+        heard = [site.numbered_since for site in self.sites.values() if site.index == index]
+        known = [since for since in heard if since is not None] or self._ledger.numberings(own, index)
+        return max(own, max(known, default=math.inf))
 
     @property
     def now(self) -> float:

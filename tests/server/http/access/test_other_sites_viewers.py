@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +16,15 @@ from fakes.service.linked_sites import LinkedSites, linked_sites
 from fakes.service.scripted_cameras import LARGE, SMALL
 from server.cli.watch import run_watch
 from server.config.sections import HttpSettings
+from server.config.tokens_file import secret_digest
+from server.http.access.authentication import Credential
 from server.http.access.authorization import ACCESS
 from server.http.app import make_app, serving
 from server.service.service import BestViewService
 
 A, B = 1, 4
 OPEN = {"open_to_all": True}
+FAMILY = {"role": "watch", "object": 1, "made": IN_FUTURE}
 
 
 class Served:
@@ -135,6 +139,40 @@ async def test_a_token_that_both_sites_accept_shows_who_is_at_the_other(tmp_path
         served.sites.walk(2, yard={A: SMALL, B: LARGE})
         assert await served.elsewhere("desk") == [], "revoked there"
         assert [person["object"] for person in await served.elsewhere("family")] == [1]
+
+
+async def test_a_token_for_a_person_is_void_once_the_site_of_the_number_begins_anew(
+    tmp_path: Path,
+) -> None:
+    tokens = write_tokens(tmp_path / "tokens.yaml", token_entry("family", **FAMILY))
+    with linked_sites("yard") as sites:
+        sites.stop("yard")
+        yard = sites.start("yard", access={"tokens": str(tokens)})
+        app = make_app(BestViewService(yard))
+        authenticator = app[ACCESS].authenticator
+        credential = Credential(secret_digest(token_of("family")))
+
+        def refusal() -> str:
+            grant = authenticator.grant_of(credential)
+            return grant if isinstance(grant, str) else ""
+
+        sites.walk(1, yard={B: LARGE})
+        assert "of another site that has not been heard" in refusal()
+        sites.start("hall", first=0)
+        sites.walk(2, hall={A: SMALL}, yard={B: LARGE})
+        write_tokens(tokens, token_entry("family", **FAMILY | {"made": datetime.now(UTC).isoformat()}))
+        for _ in range(2):  # a changed file is read once it has stayed the same
+            authenticator.file.reload_if_changed()  # type: ignore[union-attr]
+        assert sites.elsewhere("yard") == {1: "hall"}
+        assert refusal() == ""
+        assert authenticator.tokens_of_viewers()
+        sites.stop("hall")
+        sites.walk(1, yard={B: LARGE})
+        assert refusal() == ""
+        sites.start("hall")
+        sites.walk(3, hall={A + 8: SMALL}, yard={B: LARGE})
+        assert refusal().startswith("person numbers have restarted since the token 'family' was made")
+        assert not authenticator.tokens_of_viewers()
 
 
 def told(served: Served) -> list[tuple[str, Any]]:
