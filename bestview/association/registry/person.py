@@ -59,6 +59,7 @@ class Person:
     def merge(self, other: Person) -> None:
         """Add everything known about `other`: the two are one person."""
         self.appearance.add_all(other.appearance)
-        self.add_sighting(other.camera, other.last_frame)
+        if not other.elsewhere:
+            self.add_sighting(other.camera, other.last_frame)
         self.settled_frames += other.settled_frames
         self.remote_looks = other.remote_looks | self.remote_looks

@@ -50,6 +50,8 @@ class PeopleHere:
             number = registry.current(person.person_id)
             if person.elsewhere or not person.camera or number > PERSON_NUMBER_MAX:
                 continue
+            if "/" in person.camera:  # of another site: receivers would refuse the whole message
+                continue
             ids.setdefault(number, []).append(person.person_id)
             places[number] = max(places.get(number, (-1, "")), (person.last_frame, person.camera))
         found = []

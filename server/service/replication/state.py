@@ -26,7 +26,7 @@ def state_of(people: PersonTracker, record: ServiceRecord) -> ServiceState:
                 first_seen=max(0, registry.first_seen[number]),
                 last_seen=max(0, registry.last_seen[number]),
                 departed=number in registry.departed,
-                camera="" if person is None else person.camera,
+                camera="" if person is None or person.elsewhere else person.camera,
                 settled_frames=0 if person is None else person.settled_frames,
                 aliases=[old for old in registry.aliases(number) if old <= PERSON_NUMBER_MAX][-ALIASES_MAX:],
                 name=registry.names.get(number, ""),

@@ -15,8 +15,10 @@ from bestview import (
     IdentitySettings,
     IdentityUpdate,
     IdSeries,
+    Person,
     RemoteSighting,
 )
+from bestview.association.affinity.travel_times import CameraSighting
 from bestview.association.appearance.histograms import (
     HistogramEqualizer,
     MeanHistogram,
@@ -218,3 +220,12 @@ def test_ids_of_other_sites_do_not_raise_the_own_ones() -> None:
     assert registry.next_id == 1
     registry.reserve_below(8)
     assert registry.next_id == 9
+
+
+@pytest.mark.parametrize("is_newer", [True, False])
+def test_merging_somebody_elsewhere_brings_no_camera_of_another_site(*, is_newer: bool) -> None:
+    here, gone = Person(1, 50, "south"), Person(2)
+    gone.see_elsewhere(RemoteSighting(2, "yard", "c0", 90 if is_newer else 10, is_visible=False))
+    here.merge(gone)
+    assert here.last_sighting == CameraSighting("south", 50)
+    assert not here.elsewhere
