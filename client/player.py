@@ -78,9 +78,10 @@ async def watch(
         if left is not None:
             left -= result.seconds
         onward = None if place is None or (left is not None and left <= 0) else _at(place, url, settings)
-        if onward is None:
+        if place is None or onward is None:
             return _sum(watched)
         url, settings = onward
+        number = place.object
         file = None if out is None else out.with_stem(f"{out.stem}-{len(watched) + 1}")
 
 
@@ -121,14 +122,14 @@ async def _watch_site(
 
 
 def _at(place: Elsewhere, url: str, settings: HttpSettings) -> tuple[str, HttpSettings] | None:
-    """Return another site's address and settings; None: it is none, or not encrypted as this one is."""
+    """Return another site's or area's address and settings; None: none, or not encrypted as this one is."""
     try:
         there, here = server_url(place.server or ""), server_url(url)
     except ValueError:
         return None
     if here.scheme == "https" and there.scheme != "https":
         return None
-    token = settings.token if place.token else None
+    token = settings.token if place.token or place.site is None else None
     return str(there), replace(settings, others=(), token=token)
 
 

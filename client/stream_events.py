@@ -47,6 +47,8 @@ class ViewHistory:
         self.site: Site | None = None
         self.elsewhere: Elsewhere | None = None
         """Where they are, if another site or area sees the object now."""
+        self._numbers = {number}
+        """The object's, with those that the server last said are merged with it."""
         self._spool = spool
         self._firsts: list[int] = []
         self._shown: dict[int, _Shown] = {}
@@ -63,9 +65,12 @@ class ViewHistory:
         self._updated.set()
 
     def _elsewhere(self, objects: Objects) -> Elsewhere | None:
-        if any(here.visible for here in objects.objects if self.number in {here.object, *here.aliases}):
-            return None
-        places = (place for place in objects.elsewhere if place.object == self.number)
+        for here in objects.objects:
+            if self.number in {here.object, *here.aliases}:
+                self._numbers = {here.object, *here.aliases}
+                if here.visible:
+                    return None
+        places = (place for place in objects.elsewhere if place.object in self._numbers)
         return next((place for place in places if place.server and place.visible), None)
 
     def camera_at(self, media_time: float | None) -> str | None:

@@ -8,12 +8,14 @@ from contextlib import AsyncExitStack
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from aiohttp import web
 
 import client
 from client.http import HttpSettings
 from client.player import _at
+from client.stream_events import ViewHistory
 from fakes.http.scripted_server import OBJECTS, ScriptedSite, fragment, header, sse_event
 from fakes.http.tokens import token_of
 from fakes.timeouts import PATIENCE
@@ -100,3 +102,21 @@ def test_a_token_goes_along_only_to_a_site_that_accepts_it(
     found = _at(client.Elsewhere(object=1, site="yard", visible=True, **place), url, settings)
     assert (None if found is None else (found[0], found[1].token)) == expected
     assert found is None or not found[1].others
+
+
+def test_a_token_goes_along_into_another_area_of_the_same_site() -> None:
+    place = client.Elsewhere(object=1, server="http://hall-2/", visible=True)
+    found = _at(place, "http://hall/", HttpSettings(token=TOKEN))
+    assert found is not None
+    assert found[1].token == TOKEN
+
+
+def test_whoever_was_merged_into_another_number_is_followed_by_that_one() -> None:
+    history = ViewHistory(1)
+    [person] = msgspec.convert(OBJECTS, client.Objects).objects
+    there = client.Elsewhere(object=4, server="http://yard/", site="yard", visible=True)
+    merged = msgspec.structs.replace(person, object=4, aliases=(1,), visible=True)
+    history.take(client.Objects((merged,), (there,)))
+    assert history.elsewhere is None
+    history.take(client.Objects((), (there,)))
+    assert history.elsewhere == there
