@@ -1,9 +1,9 @@
 """The record of who is who, which the best-view services of a site exchange.
 
-Every service computes identities by itself, the same from the same messages. Once a second it publishes its
-record; the others compare it with their own of the same pulse, and follow the leading service where they
-differ. A service that starts takes over the state of the leading one: the record, and what is known about
-people besides their tracks.
+Every service computes identities by itself, the same from the same messages. Once a second, with areas every
+epoch, it publishes its record; the others compare it with their own of the same pulse, and follow the leading
+service where they differ. A service that starts takes over the state of the leading one: the record, and what
+is known about people besides their tracks.
 """
 
 from __future__ import annotations
