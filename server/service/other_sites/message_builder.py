@@ -27,6 +27,8 @@ from server.service.other_sites.people_here import PeopleHere, PersonHere
 
 _LOOKS_BYTES = 1 << 14
 """Bytes of looks in a message, at most."""
+_DELETIONS_BYTES = 1 << 13
+"""Bytes of the newest deletions in a message, and of older ones, at most; one of any size fits."""
 _LOOKS_EVERY = 3
 """Messages after which the looks of somebody who is here are sent again, if they are known better."""
 _LOOKS_GROWTH = 1.25
@@ -60,6 +62,8 @@ class SiteMessageBuilder:
         self._count = 0
         self._viewers: Viewers | None = None
         self._bins = 0
+        self._next_older = 0
+        """Where the next turn of older deletions begins."""
 
     def build(
         self,
@@ -161,11 +165,24 @@ class SiteMessageBuilder:
 
     def _next_deletions(self, deletions: Sequence[SiteDeletion]) -> list[SiteDeletion]:
         """Return the newest ones, and the older ones in turn."""
-        newest = deletions[-(DELETIONS_MAX // 2) :]
-        older = deletions[: -len(newest)] if newest else []
-        turns = max(1, -(-len(older) // (DELETIONS_MAX // 2)))
-        begin = self._count % turns * (DELETIONS_MAX // 2)
-        return [*newest, *older[begin : begin + DELETIONS_MAX // 2]]
+        newest = _fitting(deletions[::-1])[::-1]
+        older = deletions[: len(deletions) - len(newest)]
+        begin = self._next_older % max(1, len(older))
+        turn = _fitting([*older[begin:], *older[:begin]])
+        self._next_older = begin + len(turn)
+        return [*newest, *turn]
+
+
+def _fitting(deletions: Sequence[SiteDeletion]) -> list[SiteDeletion]:
+    """Return the first ones: half of those of a message, as far as their bytes fit."""
+    fitting: list[SiteDeletion] = []
+    size = 0
+    for deletion in deletions[: DELETIONS_MAX // 2]:
+        size += len(msgspec.msgpack.encode(deletion))
+        if fitting and size > _DELETIONS_BYTES:
+            break
+        fitting.append(deletion)
+    return fitting
 
 
 def _pack(number: int, histogram: MeanHistogram) -> Looks:

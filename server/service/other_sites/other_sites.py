@@ -59,7 +59,7 @@ _STAY_MARGIN_S = 2.0
 """Seconds by which two sites' times of arrival may be wrong."""
 _CONFLICTS = 2
 """Messages in a row that say a person is at another site while they are here, before one gives way."""
-_UNHEARD_S = 30.0
+UNHEARD_S = 30.0
 """Seconds without a word of a site after which that is logged."""
 _PEOPLE = msgspec.msgpack.Decoder(SitePeople)
 
@@ -101,6 +101,7 @@ class OtherSites:
         """Returns the tokens of this site's viewers; None: it needs none. Not set: nobody may know."""
         self.bad_messages = 0
         self.sent_bytes = 0
+        self._has_been_too_long = False
         replication.on_added.append(self._deletions.add)
 
     @property
@@ -289,7 +290,11 @@ class OtherSites:
             if site.heard_at is not None and not site.is_there(now, SILENT_S):
                 left = self.elsewhere.leave_silent_site(site)
                 self._people.identity.see_elsewhere([person.sighting() for person in left], {})
-            elif site.heard_at is None and not site.is_missed and self._began + _UNHEARD_S < now:
+            elif (
+                site.heard_at is None
+                and not (site.refused or site.is_missed)
+                and self._began + UNHEARD_S < now
+            ):
                 site.is_missed = True
                 log.warning(
                     "site %s: nothing heard from sites.link.%s.connect: is it up, is that its site.name, and "
@@ -314,6 +319,9 @@ class OtherSites:
         if len(payload) <= MESSAGE_BYTES_MAX:
             self.sent_bytes += len(payload)
             self._bus.publish_people(payload)
+        elif not self._has_been_too_long:
+            self._has_been_too_long = True
+            log.error("message to other sites dropped: %d bytes, at most %d", len(payload), MESSAGE_BYTES_MAX)
 
     def _viewers(self) -> Viewers:
         if self.accepted_tokens is None:

@@ -21,6 +21,7 @@ from server.messaging.site_people import (
     unpack_sightings,
 )
 from server.service.identity.state_recovery import state_for_cameras
+from server.service.other_sites.other_sites import UNHEARD_S
 from server.service.other_sites.people_elsewhere import HEARD_S, SILENT_S
 
 A, B = 1, 4
@@ -140,10 +141,14 @@ async def test_sites_with_the_same_numbers_are_refused_in_one_line(
 ) -> None:
     sites = LinkedSites()
     hall = sites.start("hall")
+    hall.other_sites._began = sites.now
     sites.start("yard", sites=settings)
     with caplog.at_level(logging.INFO):
         sites.walk(4, yard={A: SMALL})
+        sites.now += UNHEARD_S
+        sites.walk(1)
     assert caplog.messages.count(reason) == 1
+    assert not any("site yard: nothing heard" in line for line in caplog.messages)
     assert sites.elsewhere("hall") == {}
     assert hall.decider.people.identity.people == []
     for service in sites.running.values():

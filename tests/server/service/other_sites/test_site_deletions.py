@@ -13,7 +13,7 @@ from fakes.service.linked_sites import LinkedSites, linked_sites
 from fakes.service.scripted_cameras import LARGE, SMALL
 from fakes.timeouts import PATIENCE
 from server.messaging.service_record import DeletedPerson
-from server.messaging.site_people import DELETIONS_MAX, SiteDeletion
+from server.messaging.site_people import DELETIONS_MAX, MESSAGE_BYTES_MAX, SiteDeletion
 from server.service.deletion.journal import JOURNAL_FILE, Deletion
 from server.service.facade.deletion import DeletePerson
 from server.service.other_sites.deletions import SiteDeletions
@@ -137,6 +137,22 @@ async def test_all_deletions_are_told_in_turn() -> None:
         assert {number for told in messages for each in told for number in each.numbers} == {
             *range(1, 300, 3)
         }
+
+
+async def test_deletions_of_many_numbers_are_told_in_short_messages() -> None:
+    with linked_sites() as sites:
+        sites.walk(1, hall={A: SMALL})
+        hall = sites.running["hall"]
+        since = hall.state_replication.numbers_since
+        for first in range(10**8, 10**8 + 75_000, 3000):
+            numbers = list(range(first, first + 3000, 3))
+            deletion = DeletedPerson(numbers=numbers, numbers_since=since, deletes_media=False)
+            hall.other_sites._deletions.add(deletion)
+        sites.told.clear()
+        sites.walk(18)
+        told = [message.deletions for sender, message in sites.told if sender == "hall"]
+        assert len({deletion.numbers[0] for deletions in told for deletion in deletions}) == 25
+        assert max(sites.bytes) < MESSAGE_BYTES_MAX / 2
 
 
 def test_a_damaged_ledger_is_one_line_and_counts_as_empty(
