@@ -112,8 +112,8 @@ class PictureMonitor:
             self._reference = Reference(structure)
         if still and self._reference.is_seen(structure):
             return "frozen"
+        noise = structure.noise(last)
         if self._learned_s >= _FIRST_S:
-            noise = structure.noise(last)
             self._cover.observe(structure, self._reference.structure, noise, elapsed)
             sign = self._reference.sign(structure, before, noise, seconds)
             if sign != "clear" or still:
@@ -122,9 +122,8 @@ class PictureMonitor:
         if self._learned_s < _FIRST_S or self._unlearned_s >= _LEARN_EVERY_S:
             self._learned_s += self._unlearned_s
             span = min(max(self._learned_s, self._unlearned_s), _AVERAGE_S)
-            self._reference.learn(
-                structure, self._unlearned_s / span if span else 1.0, self._cover.mask(structure.gray.shape)
-            )
+            share = self._unlearned_s / span if span else 1.0
+            self._reference.learn(structure, share, self._cover.mask(structure.gray.shape), noise)
             self._unlearned_s = 0.0
         return "clear"
 

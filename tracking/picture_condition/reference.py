@@ -18,7 +18,7 @@ from tracking.detectors.background.motion import STILL, Motion
 from tracking.detectors.background.registration import Registration
 from tracking.detectors.background.views.view_matching import TURNED
 from tracking.detectors.base import Image, Plane
-from tracking.picture_condition.structure import Structure, reduce, structure_of
+from tracking.picture_condition.structure import Structure, cell_means, reduce, structure_of
 from tracking.types import PictureCondition
 
 CONDITIONS: tuple[PictureCondition, ...] = get_args(PictureCondition)
@@ -69,7 +69,8 @@ class Reference:
     def __init__(self, structure: Structure) -> None:
         self._gray: Plane = structure.gray.copy()
         self._structure = structure
-        self._detail = structure.detail
+        # Means of squares, both: the mean picture has less detail and weaker gradients than each if they differ.
+        self._detail, self._gradient = structure.detail, structure.edges
         self._motion, self._search_at = STILL, 0.0
 
     @property
@@ -77,11 +78,22 @@ class Reference:
         """What the camera showed."""
         return self._structure
 
-    def learn(self, structure: Structure, share: float, hidden: npt.NDArray[np.bool_]) -> None:
-        """Take over a share, up to 1, of a picture, except where it is `hidden` `(h, w)`."""
+    def learn(
+        self, structure: Structure, share: float, hidden: npt.NDArray[np.bool_], noise: float = 0.0
+    ) -> None:
+        """Take over a share, up to 1, of a picture, except where it is hidden.
+
+        Args:
+            structure: of the picture.
+            share: how much of it.
+            hidden: `(h, w)`.
+            noise: mean squared gradient that is noise.
+        """
         shares = np.where(hidden, np.float32(0.0), np.float32(share))
         self._gray += shares * (structure.gray - self._gray)
-        self._detail = self._detail + share * (structure.detail - self._detail)
+        shown = cell_means(shares, structure.edges.shape)
+        self._detail = self._detail + shown * (structure.detail - self._detail)
+        self._gradient = self._gradient + shown * (np.maximum(structure.edges - noise, 0.0) - self._gradient)
         self._structure = structure_of(self._gray)
 
     def sign(self, structure: Structure, before: Structure, noise: float, seconds: float) -> PictureCondition:
@@ -117,7 +129,7 @@ class Reference:
         if shares.seen < _NO_SCENE or not seen.any():
             return "clear"
         sharp = np.median(detail[seen] / np.maximum(self._detail[seen], _LEAST_DETAIL))
-        contrast = np.median(edges[seen] / self._structure.edges[seen])
+        contrast = np.median(edges[seen] / np.maximum(self._gradient[seen], _LEAST_DETAIL))
         return "blurred" if sharp < _BLURRED * contrast else "clear"
 
     def is_seen(self, structure: Structure) -> bool:

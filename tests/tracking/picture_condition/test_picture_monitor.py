@@ -12,6 +12,8 @@ import pytest
 from server.messaging.camera_status import CONDITION_TEXTS
 from tracking.detectors import Image
 from tracking.picture_condition import CONDITIONS, PictureMonitor
+from tracking.picture_condition.reference import Reference
+from tracking.picture_condition.structure import reduce, structure_of
 
 WIDTH, HEIGHT = 320, 180
 FPS = 10.0
@@ -178,6 +180,31 @@ def test_a_plain_scene_is_not_judged() -> None:
         conditions(lambda image, _: np.asarray(cv2.GaussianBlur(image, (0, 0), 3.0)), room=wall, people=0)
         == []
     )
+
+
+@pytest.mark.parametrize(("level", "flat_s", "levels"), [(0, 5.0, 0.0), (128, 1.5, 2.0), (255, 40.0, 2.0)])
+def test_a_camera_that_shows_nothing_at_first_is_not_blurred(
+    level: int, flat_s: float, levels: float
+) -> None:
+    monitor, fps, shown = PictureMonitor(5.0), 5.0, set()
+    for frame in range(round((flat_s + 40.0) * fps)):
+        is_flat = frame < flat_s * fps
+        image = np.full_like(ROOM, level) if is_flat else with_people(ROOM, frame / fps, 3)
+        shown.add(monitor.observe(image if is_flat else with_noise(image, frame, levels), frame))
+    assert shown == {"clear"}
+    for frame in range(frame + 1, frame + round(FAULT_S * fps)):
+        monitor.observe(blurred(ROOM, frame / fps), frame)
+    assert monitor.condition == "blurred"
+
+
+def test_sharpness_is_not_learned_from_what_is_hidden() -> None:
+    reference = Reference(structure_of(reduce(ROOM)))
+    paint, hidden = ROOM.copy(), np.zeros((HEIGHT, WIDTH), dtype=np.bool_)
+    paint[:, : WIDTH * 3 // 4], hidden[:, : WIDTH * 3 // 4] = 40, True
+    for _ in range(50):
+        reference.learn(structure_of(reduce(paint)), 0.1, hidden)
+    soft = structure_of(reduce(np.asarray(cv2.GaussianBlur(ROOM, (0, 0), 3.0))))
+    assert reference.sign(soft, soft, 0.0, 0.0) == "blurred"
 
 
 def test_a_camera_that_stays_turned_is_accepted_after_minutes() -> None:
