@@ -42,6 +42,7 @@ class ShownView:
         """The pulse from which on it is unknown where the picture lies; None: it is known."""
         self._covered: NDArray[np.bool_] | None = None
         self._flicker: Mask | None = None
+        self._is_blind = False
         self.hidden: NDArray[np.float64] = np.empty((0, BOX_SIDES))
         """The part of the site's picture in which a cover on the lens, or leaves, hide people.
 
@@ -74,9 +75,14 @@ class ShownView:
             if covered is not self._covered:
                 none = np.empty((0, BOX_SIDES))
                 detector.cover(none if covered is None else cell_rectangles(covered, size))
-        if covered is self._covered and flicker is self._flicker:
+        # A lens that is partly covered may then go wholly dark: what was the covered part says nothing then.
+        is_blind = self.condition == "covered" and not self.monitor.shows_now
+        if covered is self._covered and flicker is self._flicker and is_blind is self._is_blind:
             return
-        self._covered, self._flicker = covered, flicker
+        self._covered, self._flicker, self._is_blind = covered, flicker, is_blind
+        if is_blind:
+            self.hidden = self._scale.boxes_to_site(np.array([[0.0, 0.0, *size]]))
+            return
         cells = [] if covered is None else [covered]
         grid = None if covered is None else covered.shape
         cells += [] if flicker is None else [cells_of(flicker, grid)]

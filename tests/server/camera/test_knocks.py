@@ -160,6 +160,21 @@ def test_a_camera_whose_lens_is_covered_in_part_shows_its_place_in_the_rest() ->
     assert shares[49] == shares[-1] == 0.0
 
 
+def test_a_partly_covered_lens_that_goes_dark_shows_nothing() -> None:
+    room, random = KnockedCamera().take(0), np.random.default_rng(0)
+    view, shares = ShownView(5.0, HogDetector(), SCALE), []
+    for frame in range(80):
+        picture = np.clip(room + 2.0 * random.standard_normal(room.shape), 0, 255).astype(np.uint8)
+        if frame >= 25:
+            picture[:, : SIZE[0] // 2] = (40, 60, 150)
+            edge = slice(SIZE[0] // 2 - 10, SIZE[0] // 2 + 10)
+            picture[:, edge] = cv2.blur(picture, (21, 1))[:, edge]
+        view.observe(np.full_like(room, 20) if frame >= 50 else picture, frame)
+        shares.append(areas(view.hidden).sum() / (SIZE[0] * SIZE[1]))
+    assert shares[49] == pytest.approx(0.5, abs=0.1)
+    assert (view.condition, shares[-1]) == ("covered", 1.0)
+
+
 def test_a_view_that_is_lost_for_long_without_a_turn_lies_where_it_lay() -> None:
     """A camera that was turned, and then changed to infrared."""
     turned = np.array([[1.0, 0.0, 60.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
