@@ -15,7 +15,7 @@ from server.service.identity.camera_window import CameraWindow
 from tracking.boxes import areas
 
 _MUCH_HIDDEN = 0.25
-"""Share of a picture."""
+"""Share of a camera's picture."""
 
 
 class UndetectedFrames:
@@ -56,6 +56,6 @@ class UndetectedFrames:
 
 
 def _hidden_share(window: CameraWindow) -> float:
-    """Return the share of a camera's picture in which people are hidden."""
-    width, height = window.letterbox.site_size
+    """Return the share of a camera's own picture, without the site's bars, in which people are hidden."""
+    *_, width, height = window.letterbox.content
     return float(areas(unpack_boxes([window.message.covered])).sum()) / (width * height)

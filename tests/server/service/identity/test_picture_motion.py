@@ -8,8 +8,10 @@ import pytest
 
 from bestview import to_ground
 from fakes.service.scripted_cameras import HEIGHT, WIDTH, camera_tracks, epoch_of
+from server.messaging.packed_arrays import pack_boxes
 from server.messaging.picture_motion import calibrated_boxes, moved_homography, picture_motion, shown_boxes
 from server.service.identity.camera_window import WindowReader
+from server.service.identity.undetected_frames import UndetectedFrames
 from tracking.detectors.background.motion import Motion
 
 SIZE = (WIDTH, HEIGHT)
@@ -73,3 +75,15 @@ def test_tracks_for_identity_do_not_show_that_the_camera_was_knocked() -> None:
     assert windows[1].boxes[0, 0] == pytest.approx([left, top, right, bottom]), (
         "the page draws it where it is"
     )
+
+
+def test_a_portrait_camera_with_much_of_its_own_picture_hidden_sees_nobody() -> None:
+    size = (WIDTH // 4, HEIGHT)
+    left = (WIDTH - size[0]) / 2
+    for share, is_detecting in ((0.2, True), (0.4, False)):
+        covered = pack_boxes([(left, 0.0, left + share * size[0], float(HEIGHT))])
+        message = camera_tracks("c0", 0, {}, size=size, covered=covered)
+        windows = WindowReader(SIZE).read(epoch_of(0, message))
+        assert (
+            bool(UndetectedFrames().detecting_cameras(windows, message.first, message.last)) is is_detecting
+        )
