@@ -69,7 +69,7 @@ class Reference:
     def __init__(self, structure: Structure) -> None:
         self._gray: Plane = structure.gray.copy()
         self._structure = structure
-        # Means of squares, both: the mean picture has less detail and weaker gradients than each if they differ.
+        # Means of squares, both: the mean picture has weaker gradients than each of those that differ.
         self._detail, self._gradient = structure.detail, structure.edges
         self._motion, self._search_at = STILL, 0.0
 

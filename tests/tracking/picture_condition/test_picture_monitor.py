@@ -192,8 +192,8 @@ def test_a_camera_that_shows_nothing_at_first_is_not_blurred(
         image = np.full_like(ROOM, level) if is_flat else with_people(ROOM, frame / fps, 3)
         shown.add(monitor.observe(image if is_flat else with_noise(image, frame, levels), frame))
     assert shown == {"clear"}
-    for frame in range(frame + 1, frame + round(FAULT_S * fps)):
-        monitor.observe(blurred(ROOM, frame / fps), frame)
+    for index in range(round(FAULT_S * fps)):
+        monitor.observe(blurred(ROOM, index / fps))
     assert monitor.condition == "blurred"
 
 
