@@ -35,20 +35,22 @@ async def redirect_to_shard(
         camera = _CAMERA_PATH.match(request.path)
         server = None if camera is None else request.app[SERVICE].cameras.server_of(camera[1])
         return await handler(request) if server is None else _redirect(server, request, with_token=True)
-    number = int(path[1])
+    number = request.app[SERVICE].people.current_number(int(path[1]))
     shard = request.app[SERVICE].people.shard_of(number)
     if not shard.is_own and shard.has_past and not _is_live(request):
         return await handler(request)  # of when the person was here
     if shard.is_own:
         there = _at_other_site(request, number)
-        return await handler(request) if there is None else _redirect(there.url, request, there.knows_token)
+        if there is None:
+            return await handler(request)
+        return _redirect(there.url, request, there.knows_token, number)
     if shard.server is None:
         return error_response(
             404,
             f"object {number} is served by best-view service {shard.index} of this site; "
             "view.share.servers does not have its URL",
         )
-    return _redirect(shard.server, request, with_token=True)
+    return _redirect(shard.server, request, with_token=True, number=number)
 
 
 def _at_other_site(request: web.Request, number: int) -> PersonAtSite | None:
@@ -56,7 +58,7 @@ def _at_other_site(request: web.Request, number: int) -> PersonAtSite | None:
     if not _is_live(request):
         return None
     service = request.app[SERVICE]
-    return service.sites.find(service.people.current_number(number), request.app[ACCESS].token_of(request))
+    return service.sites.find(number, request.app[ACCESS].token_of(request))
 
 
 def _is_live(request: web.Request) -> bool:
@@ -64,8 +66,14 @@ def _is_live(request: web.Request) -> bool:
     return resource is not None and resource.canonical in _LIVE and not request.query.keys() & _PAST
 
 
-def _redirect(server: str, request: web.Request, with_token: bool) -> web.Response:
-    """Answer 307; without the token in the query unless the server is to have it."""
+def _redirect(server: str, request: web.Request, with_token: bool, number: int | None = None) -> web.Response:
+    """Answer 307; without the token in the query unless the server is to have it.
+
+    ``number`` replaces the person's: the other service does not know whom an operator has merged here.
+    """
     url = request.rel_url if with_token else request.rel_url.without_query_params("token")
-    headers = {"Location": server + str(url).lstrip("/"), "Access-Control-Allow-Origin": "*"}
+    path = str(url)
+    if number is not None:
+        path = _OBJECT_PATH.sub(lambda old: old[0].replace(old[1], str(number)), path, count=1)
+    headers = {"Location": server + path.lstrip("/"), "Access-Control-Allow-Origin": "*"}
     return web.Response(status=307, headers=headers)

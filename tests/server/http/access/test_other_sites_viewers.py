@@ -76,6 +76,11 @@ async def test_viewers_are_led_to_the_site_that_sees_the_person() -> None:
         assert (status, location) == (307, "http://yard/objects/2/best.ts"), "a token that is not for it"
         for path in ("/objects/1/best.mp4?from=-5", "/objects/1/thumb.jpg", "/objects/7/best.mp4"):
             assert (await served.get(path))[0] != 307
+        merged = served.sites.running["hall"].decision_state.merged
+        merged[7] = 1
+        path = "/objects/7/best.mp4?delay=smooth"
+        assert (await served.get(path))[:2] == (307, "http://yard/objects/1/best.mp4?delay=smooth")
+        del merged[7]
         served.sites.walk(3)
         there["visible"] = False
         assert await served.elsewhere() == [{"object": 1, **there}, {"object": 2, **there}]
