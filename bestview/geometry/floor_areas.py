@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.geometry.ground_plane import from_ground, to_ground
+from bestview.geometry.ground_plane import from_ground, pixel_steps, to_ground
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +42,6 @@ class FloorAreas:
         sizes: Mapping[str, tuple[int, int]],
         count: int,
     ) -> None:
-        self.count = count
         self._views = {
             camera: view
             for camera, matrix in homographies.items()
@@ -140,9 +139,7 @@ def _is_close(homography: Floats, size: tuple[int, int], points: Floats) -> NDAr
 
 def _sideways(homography: Floats, points: Floats) -> Floats:
     """Return how long a pixel to the right is on the ground at image points (K, 2), (K,); NaN: no floor."""
-    half = np.array([0.5, 0.0])
-    ends = to_ground(homography, points + half) - to_ground(homography, points - half)
-    return np.asarray(np.hypot(*ends.T))
+    return np.asarray(np.hypot(*pixel_steps(homography, points)[..., 0].T))
 
 
 def _divide(centers: Floats, bounds: Floats, count: int) -> list[Floats]:

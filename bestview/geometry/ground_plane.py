@@ -142,7 +142,7 @@ def person_heights(homography: NDArray[np.float64], boxes: NDArray[np.float64]) 
     At the foot point one pixel sideways is as long as one pixel upwards on a standing person (square pixels,
     a camera without much roll or tilt): box height times ground units per sideways pixel.
     """
-    sideways = _pixel_steps(homography, foot_points(boxes))[..., 0]
+    sideways = pixel_steps(homography, foot_points(boxes))[..., 0]
     return np.asarray(np.hypot(sideways[..., 0], sideways[..., 1]) * (boxes[..., 3] - boxes[..., 1]))
 
 
@@ -156,14 +156,14 @@ def foot_covariance(
     """
     height = boxes[..., 3] - boxes[..., 1]
     axes = (
-        _pixel_steps(homography, foot_points(boxes)) * height[..., None, None] * np.array([sideways, upwards])
+        pixel_steps(homography, foot_points(boxes)) * height[..., None, None] * np.array([sideways, upwards])
     )
     x, y = axes[..., 0, :], axes[..., 1, :]
     xx, xy, yy = (x * x).sum(axis=-1), (x * y).sum(axis=-1), (y * y).sum(axis=-1)
     return np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=-2)
 
 
-def _pixel_steps(homography: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
+def pixel_steps(homography: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return ground vectors of one pixel to the right and one down, as columns: (..., 2) -> (..., 2, 2)."""
     mapped = _homogeneous(homography, points)
     w = np.where(_depth(homography, mapped) > 0, mapped[..., 2], np.nan)[..., None, None]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import AsyncExitStack
 from pathlib import Path
 
 import pytest
@@ -11,26 +9,8 @@ from aiohttp import web
 
 import client
 from client.http import HttpSettings
-from fakes.http.scripted_server import SITE, ScriptedSite, StreamScript, fragment, header, send_nothing
+from fakes.http.scripted_server import SITE, ScriptedSite, Serve, StreamScript, fragment, header, send_nothing
 from server.cli.generated_config import free_port
-
-Serve = Callable[[ScriptedSite], Awaitable[str]]
-
-
-@pytest.fixture
-async def serve() -> AsyncIterator[Serve]:
-    """Return a function that serves a scripted site and returns its address."""
-    async with AsyncExitStack() as stack:
-
-        async def start(site: ScriptedSite) -> str:
-            runner = web.AppRunner(site.app(), shutdown_timeout=0.1)
-            await runner.setup()
-            stack.push_async_callback(runner.cleanup)
-            port = free_port()
-            await web.TCPSite(runner, "127.0.0.1", port).start()
-            return f"http://127.0.0.1:{port}/"
-
-        yield start
 
 
 def plays(*pieces: bytes, stays: bool) -> StreamScript:

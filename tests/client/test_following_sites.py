@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import AsyncExitStack
 from pathlib import Path
 from typing import Any
 
@@ -16,29 +14,11 @@ import client
 from client.http import HttpSettings
 from client.player import _at
 from client.stream_events import ViewHistory
-from fakes.http.scripted_server import OBJECTS, ScriptedSite, fragment, header, sse_event
+from fakes.http.scripted_server import OBJECTS, ScriptedSite, Serve, fragment, header, sse_event
 from fakes.http.tokens import token_of
 from fakes.timeouts import PATIENCE
-from server.cli.generated_config import free_port
 
 TOKEN = token_of("desk")
-Serve = Callable[[ScriptedSite], Awaitable[str]]
-
-
-@pytest.fixture
-async def serve() -> AsyncIterator[Serve]:
-    """Return a function that serves a scripted site and returns its address."""
-    async with AsyncExitStack() as stack:
-
-        async def start(site: ScriptedSite) -> str:
-            runner = web.AppRunner(site.app(), shutdown_timeout=0.1)
-            await runner.setup()
-            stack.push_async_callback(runner.cleanup)
-            port = free_port()
-            await web.TCPSite(runner, "127.0.0.1", port).start()
-            return f"http://127.0.0.1:{port}/"
-
-        yield start
 
 
 def everybody(*, visible: bool, elsewhere: list[dict[str, Any]]) -> bytes:

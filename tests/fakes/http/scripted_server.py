@@ -138,3 +138,7 @@ def _json(data: object) -> Callable[[web.Request], Awaitable[web.StreamResponse]
 
 async def _not_found(_: web.Request) -> web.StreamResponse:
     return web.json_response({"error": "there is no such object"}, status=404)
+
+
+Serve = Callable[[ScriptedSite], Awaitable[str]]
+"""Serves a scripted site, and returns its address."""
