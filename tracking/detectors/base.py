@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol, TypeAlias
 
 import numpy as np
@@ -15,6 +16,8 @@ Mask: TypeAlias = npt.NDArray[np.uint8]
 """A mask, `(H, W)`, 0 or 255: what OpenCV calls a binary image."""
 Plane: TypeAlias = npt.NDArray[np.float32]
 """One value per pixel or cell, `(H, W)`."""
+Relight: TypeAlias = Callable[[Image], Image]
+"""Changes the light of an image of any size."""
 _CHANNELS = 3
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
+import cv2
 import numpy as np
 import pytest
 
-from fakes.tracking.drawn_people import WIDTH, Figure, picture
+from fakes.tracking.drawn_people import HEIGHT, WIDTH, Figure, picture
 from tracking.boxes import Floats, iou
 from tracking.detectors import BackgroundDetector, FusedDetector, FusedSettings
-from tracking.detectors.base import Image
+from tracking.detectors.base import Image, Relight
 from tracking.detectors.fused.explanation import consider_wrong_people, to_probability
 from tracking.types import Detections
 
@@ -29,8 +30,9 @@ class ListedNetwork:
         self.frame = 0
         self.runs: list[int] = []
 
-    def find(self, image: Image) -> Detections:
+    def find(self, image: Image, relight: Relight | None = None) -> Detections:
         """Return the boxes of the current frame."""
+        del relight
         assert image.ndim == 3
         self.runs.append(self.frame)
         listed = self._finder(self.frame)
@@ -71,8 +73,8 @@ def test_the_network_is_shown_pictures_of_the_dark_in_the_usual_light(light: flo
     shown: list[Image] = []
 
     class WatchedNetwork(ListedNetwork):
-        def find(self, image: Image) -> Detections:
-            shown.append(image)
+        def find(self, image: Image, relight: Relight | None = None) -> Detections:
+            shown.append(image if relight is None else relight(image))
             return super().find(image)
 
     detector = FusedDetector(BackgroundDetector(), WatchedNetwork(lambda _: []))
@@ -83,6 +85,22 @@ def test_the_network_is_shown_pictures_of_the_dark_in_the_usual_light(light: flo
     assert error < 10.0
     # In the usual light it is shown what the camera shows.
     assert light < 1.0 or any(np.array_equal(shown[-1], picture([WALKER], frame)) for frame in range(90))
+
+
+@pytest.mark.parametrize("is_foggy", [False, True])
+def test_a_large_picture_that_is_reduced_first_is_relit_to_the_same(*, is_foggy: bool) -> None:
+    veil = np.linspace(0.7, 0.4, HEIGHT)[:, None, None]
+    detector = BackgroundDetector()
+    for frame in range(90):
+        image = picture([WALKER], frame, 0.6 if frame >= 60 and not is_foggy else 1.0)
+        if frame >= 60 and is_foggy:
+            image = np.asarray(image + (190.0 - image) * veil, dtype=np.uint8)
+        detector.scan(detector.to_work_image(image))
+    large, size = cv2.resize(image, None, fx=6.0, fy=6.0), (300, 300)
+    reduced = np.asarray(cv2.resize(large, size), dtype=np.uint8)
+    shown = detector.relit(reduced).astype(np.float64)
+    assert np.abs(shown - cv2.resize(detector.relit(large), size)).mean() < 1.0
+    assert np.abs(shown - reduced).mean() > 10.0, "it was relit"
 
 
 def test_a_network_box_without_foreground_is_doubted() -> None:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 
 from fakes.tracking.tiny_networks import save_network, yolov5, yolov8
-from tracking.detectors import OnnxDetector, OnnxSettings
+from tracking.detectors import Image, OnnxDetector, OnnxSettings
 from tracking.detectors.neural.yolo_output import decode_output
 
 # The picture is twice as large as the input and has its proportions: no bars.
@@ -113,6 +113,26 @@ def test_boxes_are_mapped_back_from_the_stretched_input(tmp_path: Path) -> None:
     left, top, width, height = MIDDLE[0] - MIDDLE[2] / 2, MIDDLE[1] - MIDDLE[3] / 2, MIDDLE[2], MIDDLE[3]
     expected = [2 * left, top / 1.5, 2 * (left + width), (top + height) / 1.5]
     np.testing.assert_allclose(seen.boxes, [expected], atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("resize", "reduced"), [("stretch", (64, 96)), ("letterbox", (54, 96))], ids=["stretch", "letterbox"]
+)
+def test_a_picture_is_relit_at_the_size_of_the_input(
+    tmp_path: Path, resize: str, reduced: tuple[int, int]
+) -> None:
+    sizes: list[tuple[int, ...]] = []
+
+    def to_a_third(image: Image) -> Image:
+        sizes.append(image.shape[:2])
+        return np.full_like(image, 85)
+
+    network = detector(save_network(tmp_path / "tiny.onnx", V8), resize=resize, min_score=0.0)
+    white = np.full((1080, 1920, 3), 255, dtype=np.uint8)
+    before, after = (network.find(white, relight).scores.max() for relight in (None, to_a_third))
+    assert sizes == [reduced]
+    # The scores of this network grow with the brightness of what it is shown; bars are not relit.
+    assert after < before if resize == "stretch" else after == before
 
 
 @pytest.mark.parametrize("wrong", [np.nan, np.inf])

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from tracking.boxes import Floats, heights, iou
 from tracking.detectors.background.detector import BackgroundDetector, ForegroundScan
 from tracking.detectors.background.motion import STILL, Motion
-from tracking.detectors.base import Image, Mask
+from tracking.detectors.base import Image, Mask, Relight
 from tracking.detectors.fused.carried_boxes import CarriedBoxes
 from tracking.detectors.fused.explanation import (
     FusedHypotheses,
@@ -48,8 +48,11 @@ _KNOWN = 0.3
 class PersonNetwork(Protocol):
     """A network that finds people in single images; its scores are probabilities."""
 
-    def find(self, image: Image) -> Detections:
-        """Return the people in an image `(H, W, 3)`, without appearance."""
+    def find(self, image: Image, relight: Relight | None = None) -> Detections:
+        """Return the people in an image `(H, W, 3)`, without appearance.
+
+        `relight` changes the light of an image of any size: best of the one that the network is shown.
+        """
         ...
 
 
@@ -165,7 +168,7 @@ class FusedDetector:
         scan = self._background.scan(work_image)
         runs = self._schedule.is_due(self._frame, needed=self._is_needed)
         if runs:
-            found = self.network.find(self._background.relit(image))
+            found = self.network.find(image, self._background.relit)
             in_work = self._background.grid.image_to_work(found.boxes)
             self._carried.renew(work_image, replace(found, boxes=in_work))
         else:

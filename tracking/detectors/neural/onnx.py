@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from tracking.boxes import Floats
-from tracking.detectors.base import Image, validate_image
+from tracking.detectors.base import Image, Relight, validate_image
 from tracking.detectors.color_histogram import AppearanceExtractor
 from tracking.detectors.ignore_mask import IgnoreFilter, Polygons
 from tracking.detectors.neural.providers import Provider
@@ -104,14 +104,18 @@ class OnnxDetector:
         found = self.find(image)
         return replace(found, histograms=self._appearance.histograms(image, found.boxes))
 
-    def find(self, image: Image) -> Detections:
+    def find(self, image: Image, relight: Relight | None = None) -> Detections:
         """Return the people detected in an image, best first, without their appearance.
+
+        Args:
+            image: `(H, W, 3)`.
+            relight: changes the light of the image once it is reduced to the network's input.
 
         Raises:
             ValueError: not an `(H, W, 3)` uint8 image, or the network's output is not a YOLO output.
         """
         validate_image(image)
-        planes, scale, offset = self._fit_to_input(image)
+        planes, scale, offset = self._fit_to_input(image, relight)
         found = decode_output(self._session.run(planes), self.settings.output_layout, self.settings.classes)
         limits = np.array([image.shape[1], image.shape[0]] * 2, dtype=np.float64)
         boxes = np.clip((found.boxes - offset) / scale, 0.0, limits)
@@ -121,8 +125,8 @@ class OnnxDetector:
         best = non_maximum_suppression(boxes, scores, self.settings.nms_iou, self.settings.max_detections)
         return Detections(boxes[best], scores[best], np.empty((len(best), 0)))
 
-    def _fit_to_input(self, image: Image) -> tuple[Planes, Floats, Floats]:
-        """Resize the image into the center of the input `(1, 3, h, w)`, RGB, 0 to 1.
+    def _fit_to_input(self, image: Image, relight: Relight | None) -> tuple[Planes, Floats, Floats]:
+        """Resize the image into the center of the input `(1, 3, h, w)`, RGB, 0 to 1, and relight it there.
 
         Returns the input, and the scale and the offset of the image, both `(4,)` as for a box.
         """
@@ -133,8 +137,9 @@ class OnnxDetector:
         scaled_width, scaled_height = round(image.shape[1] * scales[0]), round(image.shape[0] * scales[1])
         left, top = (width - scaled_width) // 2, (height - scaled_height) // 2
         canvas = np.full((height, width, 3), _BAR_LEVEL, dtype=np.uint8)
-        canvas[top : top + scaled_height, left : left + scaled_width] = cv2.resize(
-            image, (scaled_width, scaled_height)
+        reduced = np.asarray(cv2.resize(image, (scaled_width, scaled_height)), dtype=np.uint8)
+        canvas[top : top + scaled_height, left : left + scaled_width] = (
+            reduced if relight is None else relight(reduced)
         )
         planes = cv2.dnn.blobFromImage(canvas, scalefactor=1.0 / 255.0, swapRB=True)
         return (
