@@ -14,8 +14,11 @@ from xdist.scheduler import LoadFileScheduling
 
 from fakes.paths import ROOT
 
-_REAL_TIME_FOLDERS = ("tests/e2e/", "tests/client/")
-"""Folders whose tests run in real time, and therefore not in parallel."""
+_SITES = "tests/e2e/"
+"""Tests that share running sites, and therefore one worker."""
+
+_REAL_TIME_FOLDERS = (_SITES, "tests/client/page/", "tests/server/http/operator/", "tests/server/setup/")
+"""Folders whose tests mostly wait."""
 
 # No deadline per example, since that depends on the machine; a hanging test hits its timeout.
 # All runs try the same examples, so that no run fails by chance; `make test-slow` tries others, and more.
@@ -50,16 +53,16 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Start with sites and browsers, which take longest, so that other tests run in parallel."""
+    """Start with sites and browsers: they take longest, and others have the processor while they wait."""
     items.sort(key=lambda item: [not item.nodeid.startswith(folder) for folder in _REAL_TIME_FOLDERS])
 
 
 class _RealTimeScheduling(LoadFileScheduling):
-    """Runs the tests of a file, all sites, and all browsers on one worker each."""
+    """Runs the tests of a file on one worker, and so all sites."""
 
     def _split_scope(self, nodeid: str) -> str:
         file: str = super()._split_scope(nodeid)
-        return next((folder for folder in _REAL_TIME_FOLDERS if file.startswith(folder)), file)
+        return _SITES if file.startswith(_SITES) else file
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -9,10 +9,10 @@ import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import kubernetes_validate
 import pytest
 import yaml
 from hypothesis import given, settings
@@ -23,7 +23,7 @@ from server.config.loader import load_config
 from server.config.site_config import Config
 from server.system.errors import UserError
 
-VERSIONS = ("1.28", kubernetes_validate.latest_version())
+OLD_VERSION = "1.28"
 SECRET = "hush-"  # noqa: S105 — every secret of the tests contains it
 Manifest = dict[str, Any]
 
@@ -37,7 +37,15 @@ def scripts() -> tuple[Any, Any, Any]:
 
 
 MAIN, FILES, PODS = scripts()
-SCHEMA_CONTENTS = functools.cache(kubernetes_validate.utils.schema_contents)
+
+
+@pytest.fixture(scope="module")
+def kubernetes_validate() -> Iterator[Any]:
+    """Import the validator, which takes seconds; keep the schemas, which it reads anew for every object."""
+    validator = importlib.import_module("kubernetes_validate")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(validator.utils, "schema_contents", functools.cache(validator.utils.schema_contents))
+        yield validator
 
 
 def print_manifests(*words: str | Path, token: str | None = None) -> subprocess.CompletedProcess[str]:
@@ -227,12 +235,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def cached_schemas(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Keep the schemas, which are otherwise read anew for every object."""
-    monkeypatch.setattr(kubernetes_validate.utils, "schema_contents", SCHEMA_CONTENTS)
-
-
-@pytest.fixture(autouse=True)
 def token(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MYVIEW_TOKEN", f"{SECRET}token")
 
@@ -241,13 +243,13 @@ class TestOfAnySite:
     @settings(max_examples=20, deadline=None)
     @given(content=sites(), services=st.integers(1, 2))
     def test_manifests_are_valid_whole_and_without_secrets(
-        self, folder: Path, content: Manifest, services: int
+        self, folder: Path, kubernetes_validate: Any, content: Manifest, services: int
     ) -> None:
         path = write_site(folder, content)
         count = services * content.get("view", {}).get("share", {}).get("of", 1)
         manifests, secrets = render(path, services=count), render_secrets(path, services=count)
         for made in [*manifests, *secrets]:
-            kubernetes_validate.validate(made, VERSIONS[-1], strict=True)
+            kubernetes_validate.validate(made, kubernetes_validate.latest_version(), strict=True)
         check_manifests(manifests, secrets)
         assert SECRET not in yaml.safe_dump(manifests)
         config = loaded_in_containers(manifests, secrets)
@@ -410,8 +412,8 @@ def test_probes_of_a_site_with_tokens_need_one(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["demo.yaml", "replay.yaml", "secure.yaml"])
-def test_the_example_configurations_have_valid_manifests(name: str) -> None:
+def test_the_example_configurations_have_valid_manifests(kubernetes_validate: Any, name: str) -> None:
     done = print_manifests(CONFIGS / name, "--namespace", "hall")
     assert (done.returncode, done.stderr) == (0, "")
     for made in yaml.safe_load_all(done.stdout):
-        kubernetes_validate.validate(made, VERSIONS[0], strict=True)
+        kubernetes_validate.validate(made, OLD_VERSION, strict=True)

@@ -17,6 +17,8 @@ from packaging.utils import canonicalize_name
 from fakes.paths import ROOT
 from fakes.timeouts import PATIENCE
 
+pytestmark = pytest.mark.slow
+
 _WINDOWS_ONLY = {"colorama"}
 _LOCKED = re.compile(r"^(?P<requirement>\S+==\S+(?: ; .*)?)\n(?P<via>(?:    #.*\n)+)", re.MULTILINE)
 

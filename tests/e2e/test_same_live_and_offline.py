@@ -11,7 +11,7 @@ from fakes.running.site import CAMERAS, MYVIEW, configuration, running, with_tim
 from fakes.running.stream_frames import FPS
 from synthetic import Scene, write_recording
 
-SECONDS = 7.0
+SECONDS = 5.0
 WRITTEN = (
     "choices.csv",
     "choices-live.csv",

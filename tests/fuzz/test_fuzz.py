@@ -42,6 +42,7 @@ def test_no_input_crashes_a_target(target: type[Target], tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("target", ALL, ids=[target.name for target in ALL])
+@pytest.mark.slow
 def test_the_inputs_of_a_target_are_reproducible(target: type[Target]) -> None:
     first, second = target(), target()
     try:
@@ -206,6 +207,7 @@ def test_an_unreadable_refusal_is_a_crash(text: str) -> None:
 
 
 @pytest.mark.parametrize("target", ALL, ids=[target.name for target in ALL])
+@pytest.mark.slow
 def test_a_target_restores_the_global_state(target: type[Target]) -> None:
     """Two targets overlap, and the first is closed first: their patches must be undone."""
     before = dict(os.environ), dict(vars(floor_plan))

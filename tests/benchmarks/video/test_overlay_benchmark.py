@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import asyncio
 
+import pytest
+
 from benchmarks.overlay import RoomStream, ViewerLoad, measure
 from server.config.sections import EncodeSettings, SiteSettings
 
 
+@pytest.mark.slow
 def test_the_cost_of_boxes_does_not_grow_with_viewers() -> None:
     room = RoomStream(SiteSettings(width=320, height=180), EncodeSettings())
     plain, one, many = (

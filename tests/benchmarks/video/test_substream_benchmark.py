@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from benchmarks.substream import run, site_of, write_film
 
 MAIN, SMALL = (640, 360), (160, 90)
 FRAMES = 60
 
 
+@pytest.mark.slow
 def test_a_stream_that_passes_through_costs_little_with_a_substream(tmp_path: Path) -> None:
     write_film(tmp_path / "main.h264", MAIN, FRAMES)
     write_film(tmp_path / "small.h264", SMALL, FRAMES)

@@ -26,6 +26,7 @@ def hosts() -> Iterator[NetworkHosts]:
         pytest.skip(f"needs network namespaces, as Docker does: {error}")
 
 
+@pytest.mark.slow
 async def test_a_service_whose_host_is_cut_off_is_replaced(tmp_path: Path, hosts: NetworkHosts) -> None:
     address = hosts.addresses
     config = configuration(

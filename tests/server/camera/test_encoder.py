@@ -43,7 +43,7 @@ def peak_kbps(units: list[AccessUnit]) -> float:
 
 
 @pytest.mark.parametrize("codec", ["h264", "h265"])
-@pytest.mark.parametrize("preset", ["ultrafast", "medium"])
+@pytest.mark.parametrize("preset", ["ultrafast", pytest.param("medium", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("gop", [1, 10, 50])
 def test_no_second_of_a_noisy_scene_takes_more_than_the_cap(gop: int, preset: str, codec: str) -> None:
     content = {"gop_s": gop / SITE.fps, "preset": preset, "codec": codec}

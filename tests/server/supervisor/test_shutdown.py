@@ -195,10 +195,10 @@ def waits_for_a_file(pid: int) -> bool:
     [
         ("track pipe --out tracks.txt", signal.SIGINT, 130),
         ("track pipe --out tracks.txt", signal.SIGTERM, 143),
-        ("track --det pipe --out tracks.txt", signal.SIGINT, 130),
+        pytest.param("track --det pipe --out tracks.txt", signal.SIGINT, 130, marks=pytest.mark.slow),
         ("render pipe --out out", signal.SIGINT, 130),
-        ("render pipe --out out --config site.yaml", signal.SIGINT, 130),
-        ("calibrate pipe --out ground.json", signal.SIGINT, 130),
+        pytest.param("render pipe --out out --config site.yaml", signal.SIGINT, 130, marks=pytest.mark.slow),
+        pytest.param("calibrate pipe --out ground.json", signal.SIGINT, 130, marks=pytest.mark.slow),
         ("doctor site.yaml", signal.SIGINT, 130),
     ],
 )

@@ -109,7 +109,7 @@ def with_furniture(found: dict[str, Detections], score: float) -> dict[str, Dete
     return {**found, "c0": Detections(boxes, scores, np.zeros((len(boxes), found["c0"].histograms.shape[1])))}
 
 
-@pytest.mark.parametrize("score", [0.0, 0.05, 0.15])
+@pytest.mark.parametrize("score", [0.0, pytest.param(0.05, marks=pytest.mark.slow), 0.15])
 def test_furniture_that_looks_a_little_like_a_person_never_becomes_one(score: float) -> None:
     nobody = [detect_walkers(np.full((1, 1, 2), np.nan), VIEWS, FloorNoise())[0]] * (10 * FRAMES)
     alone = tracker({"c0": CAMERAS["c0"]})

@@ -54,6 +54,7 @@ def test_speed_and_acceleration_grow_together_and_nothing_else_does() -> None:
     assert settings.turn_rate == ASSUMED.turn_rate
 
 
+@pytest.mark.slow
 def test_a_court_that_becomes_a_hall_is_learned_anew() -> None:
     scale = learned(walk(6.0, 1))
     for seed in range(20):

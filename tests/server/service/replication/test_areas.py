@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from benchmarks.scaling.divided_hall import agreement, divide, observe, run_divided
+from benchmarks.scaling.divided_hall import DividedRun, Observed, agreement, divide, observe, run_divided
 from benchmarks.scaling.simulated_hall import SimulatedHall
 from fakes.service.scripted_cameras import LARGE, SMALL, FedService, TrackNumbers, small_config
 from server.messaging.camera_identity_snapshot import CameraIdentitySnapshot, PersonSnapshot
@@ -20,10 +20,22 @@ def hall() -> SimulatedHall:
     return SimulatedHall(16, 6)
 
 
-@pytest.mark.parametrize("services", [2, 4, 8])
-def test_services_know_the_same_people_as_one(hall: SimulatedHall, services: int) -> None:
-    observed = observe(hall, 50)
-    whole, divided = run_divided(hall, observed, 1), run_divided(hall, observed, services)
+@pytest.fixture(scope="module")
+def observed(hall: SimulatedHall) -> list[Observed]:
+    return observe(hall, 50)
+
+
+@pytest.fixture(scope="module")
+def whole(hall: SimulatedHall, observed: list[Observed]) -> DividedRun:
+    """One service for everything."""
+    return run_divided(hall, observed, 1)
+
+
+@pytest.mark.parametrize("services", [2, 4, pytest.param(8, marks=pytest.mark.slow)])
+def test_services_know_the_same_people_as_one(
+    hall: SimulatedHall, observed: list[Observed], whole: DividedRun, services: int
+) -> None:
+    divided = run_divided(hall, observed, services)
     assert agreement(whole.numbers[-1], divided.numbers[-1]) == 1.0
     assert len(whole.numbers[-1]) == len(divided.numbers[-1])
     assert divided.changes <= whole.changes + 1
