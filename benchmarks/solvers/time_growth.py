@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.solvers.random_windows import WindowSize, random_window
-from benchmarks.solvers.solver_times import REPEATS, seconds
+from benchmarks.solvers.random_windows import WindowSize, meeting_window, random_window
+from benchmarks.solvers.solver_times import REPEATS, WindowCase, seconds
+from tracking.model.network import Network
 from tracking.model.settings import PAPER_COSTS
 
 SOLVERS = ("arcs", "columns")
@@ -17,11 +18,21 @@ TABLE1_SOLVERS = ("extended-dp", "arcs", "exact", "columns", "greedy-dp", "separ
 
 @dataclass(frozen=True, slots=True)
 class SizeSweep:
-    """Sizes along one axis of Fig. 21."""
+    """Sizes along one axis of Fig. 21; `values` are those on the axis."""
 
     label: str
     sizes: tuple[WindowSize, ...]
     values: tuple[int, ...]
+    layout: float = 0.0
+    """The weight μ of the layout term; with it, people meet instead of jumping at random."""
+    arcs: int | None = None
+    """Number of sizes for `arcs`, which takes minutes for more; None: all."""
+
+    def network(self, size: WindowSize, seed: int) -> Network:
+        """Build a window of that size."""
+        if not self.layout:
+            return random_window(size, PAPER_COSTS, seed)
+        return WindowCase("meeting", meeting_window, size, self.layout).network(seed)
 
 
 _PLACES, _OBJECTS, _FRAMES = (5, 10, 20, 40, 60), (1, 2, 4, 6, 8), (5, 10, 20, 40)
@@ -30,6 +41,27 @@ SWEEPS = (
     SizeSweep("observations a frame (3 objects)", tuple(WindowSize(3, k) for k in _PLACES), _PLACES),
     SizeSweep("objects (20 observations a frame)", tuple(WindowSize(n, 20) for n in _OBJECTS), _OBJECTS),
     SizeSweep("frames (3 objects, 20 observations)", tuple(WindowSize(3, 20, m) for m in _FRAMES), _FRAMES),
+)
+
+_MU = 0.001
+LAYOUT_SWEEPS = (
+    SizeSweep(
+        "observations a frame (3 objects)", tuple(WindowSize(3, k) for k in _PLACES), _PLACES, _MU, arcs=3
+    ),
+    SizeSweep(
+        "objects (20 observations a frame)",
+        tuple(WindowSize(n, 20) for n in (2, 4, 8, 16)),
+        (2, 4, 8, 16),
+        _MU,
+        arcs=2,
+    ),
+    SizeSweep(
+        "frames (3 objects, 20 observations)",
+        tuple(WindowSize(3, 20, m) for m in _FRAMES),
+        _FRAMES,
+        _MU,
+        arcs=3,
+    ),
 )
 
 
@@ -55,35 +87,39 @@ def exponent(sizes: tuple[WindowSize, ...], times: tuple[float, ...]) -> float:
 
 
 def grown(sweep: SizeSweep, solver: str, seeds: int) -> TimeGrowth:
-    """Time a solver along a sweep: means over random windows, as in the paper."""
+    """Time a solver along a sweep: means over windows, as in the paper."""
     repeats = REPEATS if solver != "arcs" else 1
+    sizes = sweep.sizes[: sweep.arcs] if solver == "arcs" else sweep.sizes
     times = tuple(
-        float(np.mean([seconds(solver, random_window(size, PAPER_COSTS, k), repeats) for k in range(seeds)]))
-        for size in sweep.sizes
+        float(np.mean([seconds(solver, sweep.network(size, seed), repeats) for seed in range(seeds)]))
+        for size in sizes
     )
-    return TimeGrowth(sweep, solver, times, exponent(sweep.sizes, times))
+    return TimeGrowth(sweep, solver, times, exponent(sizes, times))
 
 
 def exponent_of_all(growths: list[TimeGrowth], solver: str) -> float:
     """Fit one exponent to all sweeps of a solver."""
     own = [growth for growth in growths if growth.solver == solver]
-    sizes = tuple(size for growth in own for size in growth.sweep.sizes)
+    sizes = tuple(size for growth in own for size in growth.sweep.sizes[: len(growth.times)])
     return exponent(sizes, tuple(time for growth in own for time in growth.times))
 
 
-def plot_growth(growths: list[TimeGrowth], path: Path) -> None:
-    """Draw Fig. 21: time over observations, objects and frames."""
+def plot_growth(growths: list[TimeGrowth], title: str, path: Path) -> None:
+    """Draw time over observations, objects and frames."""
     from matplotlib.figure import Figure  # noqa: PLC0415 — loading it would count as a solver's time
 
+    sweeps = list(dict.fromkeys(growth.sweep for growth in growths))
     figure = Figure(figsize=(13, 4), layout="constrained")
-    for axis, sweep in zip(figure.subplots(1, len(SWEEPS)), SWEEPS, strict=True):
+    for axis, sweep in zip(figure.subplots(1, len(sweeps)), sweeps, strict=True):
         for growth in growths:
-            if growth.sweep is sweep:
+            if growth.sweep == sweep:
                 label = f"{growth.solver}, growth^{growth.exponent:.2f}"
-                axis.plot(sweep.values, 1e3 * np.array(growth.times), marker="o", label=label)
+                axis.plot(
+                    sweep.values[: len(growth.times)], 1e3 * np.array(growth.times), marker="o", label=label
+                )
         axis.set(xlabel=sweep.label, ylabel="processor time, ms", yscale="log")
         axis.legend()
-    figure.suptitle("Random windows (paper Fig. 21)")
+    figure.suptitle(title)
     figure.savefig(path, dpi=120)
 
 
