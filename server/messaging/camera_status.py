@@ -60,6 +60,17 @@ def motion_text(motion: PictureMotion) -> str:
     return f"it has moved by {motion.pixels:.0f} pixels and {motion.degrees:.1f} degrees"
 
 
+REASON_MAX = 1000
+"""Characters of a reason, at most."""
+
+
+class UnavailableCamera(msgspec.Struct, frozen=True, kw_only=True):
+    """Why a camera's process cannot open its source; it tries again."""
+
+    reason: Annotated[str, msgspec.Meta(max_length=REASON_MAX)]
+    """In a line for people, without passwords."""
+
+
 class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     """Status of a camera, once a second."""
 

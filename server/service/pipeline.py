@@ -141,10 +141,8 @@ class BestViewPipeline:
         """
         self.pulses.load_credentials()
         handlers = {
-            "video": self.ingest.video,
+            **self.ingest.handlers,
             "tracks": self._tracks,
-            "status": self.ingest.status,
-            "thumbs/*": self.ingest.thumbnail,
             "retained_identities": self._retained_identities,
         }
         on_audio = None if self.audio_buffer is None else self.ingest.audio

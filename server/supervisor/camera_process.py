@@ -19,6 +19,7 @@ from server.supervisor.sighup import reloads
 from server.supervisor.startup_checks import check_source_opens
 from server.supervisor.startup_signal import signal_started
 from server.supervisor.synthetic_homographies import add_joint_homographies
+from server.supervisor.unavailability import UnavailabilityReport
 from server.system.errors import UnavailableError, UserError
 
 log = logging.getLogger(__name__)
@@ -29,11 +30,12 @@ _RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
 async def camera_process(running: ActiveConfig, camera_id: str) -> None:
     """Run one camera; restart it when a reload changes its settings.
 
-    Waits for a network camera or device that does not answer yet.
+    Waits for a network camera or device that does not answer yet, and, once the site has started, for any
+    source that cannot be opened or used. Meanwhile the best-view service is told why.
 
     Raises:
         UserError: its source cannot be opened.
-        UnavailableError: the connection to the pulse server is lost, or the restart failed.
+        UnavailableError: the connection to the pulse server is lost.
     """
     if source_kind(running.now.camera(camera_id).source) is SourceKind.STREAM:
         signal_started()  # opening it mostly waits for a network or device, so others may start meanwhile
@@ -42,7 +44,7 @@ async def camera_process(running: ActiveConfig, camera_id: str) -> None:
     try:
         camera = await _create(running, camera_id, restart, started=False)
         signal_started()
-        while not await _run(camera, restart):
+        while not await _run(camera, camera_id, restart):
             camera = await _create(running, camera_id, restart, started=True)
     except SyncError as error:
         raise UnavailableError(f"camera {camera_id}: {error}") from error
@@ -59,39 +61,42 @@ async def _create(
     The process keeps running meanwhile: a new one would load all libraries again. ``restart`` is set when the
     settings change. ``started``: the site has started, so an error of this camera must not end it.
     """
-    unavailable, backoff = LogThrottle(quiet_s=0.0), Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
-    while True:
-        restart.clear()
-        try:
-            camera = await asyncio.to_thread(_open, running.now, camera_id)
-        except UnavailableError as error:
-            if (more := unavailable.record(str(error))) is not None:
-                log.warning("%s%s; retrying", error, more)
-            started = True
-        except UserError as error:
-            if not started:
-                raise
-            raise UnavailableError(str(error)) from error  # the supervisor restarts this process
-        else:
-            if ended := unavailable.end():
-                log.info("camera %s answers, after %.0f s", camera_id, ended.seconds)
-            return camera
-        with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(restart.wait(), backoff.next())
+    failures, backoff = LogThrottle(quiet_s=0.0), Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
+    with contextlib.closing(UnavailabilityReport(running.now, camera_id)) as report:
+        while True:
+            restart.clear()
+            try:
+                camera = await asyncio.to_thread(_open, running.now, camera_id)
+            except UserError as error:
+                if not (started or isinstance(error, UnavailableError)):
+                    raise
+                if (more := failures.record(str(error))) is not None:
+                    log.warning("%s%s; retrying", error, more)
+                report.send(str(error))
+                started = True
+            else:
+                if ended := failures.end():
+                    log.info("camera %s is available, after %.0f s", camera_id, ended.seconds)
+                return camera
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(restart.wait(), backoff.next())
 
 
 def _open(config: Config, camera_id: str) -> CameraProcess:
     return CameraProcess(fill_in_password(add_joint_homographies(config), camera_id), camera_id)
 
 
-async def _run(camera: CameraProcess, restart: asyncio.Event) -> bool:
-    """Run until the recording is over (return True) or the camera has to restart (return False)."""
+async def _run(camera: CameraProcess, camera_id: str, restart: asyncio.Event) -> bool:
+    """Run until the recording is over (return True) or the camera has to be opened again (return False)."""
     run, waiting = asyncio.create_task(camera.run()), asyncio.create_task(restart.wait())
     try:
         await asyncio.wait({run, waiting}, return_when=asyncio.FIRST_COMPLETED)
         if run.done():
             run.result()
         return run.done()
+    except UnavailableError as error:  # what the camera sends has changed
+        log.warning("camera %s: %s; opening it again", camera_id, error)
+        return False
     finally:
         restart.clear()
         for task in (run, waiting):

@@ -91,12 +91,18 @@ class IngestMessages(Target):
         aligner = EpochAligner(CAMERAS, STRIDE, grace=5)
         audio_buffer = AudioBuffer(self._form, FPS, 10.0)
         ingest = Ingest(frame_buffers, aligner, lambda *_: None, audio_buffer, audio_sender=CAMERAS[0])
-        handlers = (ingest.video, ingest.tracks, ingest.status, ingest.thumbnail)
+        handlers = {
+            "video": ingest.video,
+            "tracks": ingest.tracks,
+            "status": ingest.status,
+            "thumbs": ingest.thumbnail,
+            "unavailable": ingest.unavailable,
+        }
         for key, payload, head in _script.decode(data):
             message = Message(key, payload, head)
             if key == KEYS.sound:
                 ingest.audio(message)
-            for topic, handle in zip(("video", "tracks", "status", "thumbs"), handlers, strict=True):
+            for topic, handle in handlers.items():
                 if f"/{topic}" in key:
                     handle(message)
         aligner.take_ready(now=100)

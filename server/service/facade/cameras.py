@@ -10,7 +10,7 @@ from server.messaging.picture_motion import moved_homography
 from server.service.calibration.floor_map import floor_coverage
 from server.service.facade.errors import UnknownCameraError
 from server.service.identity.sharding import share_address
-from server.service.ingest.ingest import CameraState
+from server.service.ingest.camera_state import CameraState
 from server.service.metrics.camera_metrics import CameraProblem, RecentSeconds
 from server.service.pipeline import BestViewPipeline
 
@@ -161,8 +161,9 @@ class CameraService:
 
     def _diagnostics(self, camera: str, state: CameraState) -> CameraDiagnostics:
         status, metrics = state.status, state.metrics
+        info = msgspec.structs.asdict(self._info(camera, state))
         return CameraDiagnostics(
-            **msgspec.structs.asdict(self._info(camera, state)),
+            **{**info, "message": state.message or state.unavailable},
             bad_messages=state.bad_messages,
             clock_offset=status.clock_offset if status else None,
             sync_error=metrics.sync_error,

@@ -6,8 +6,7 @@ import logging
 import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
-from datetime import datetime
+from dataclasses import dataclass
 
 import msgspec
 
@@ -15,7 +14,7 @@ from camsync.lines import RateLimit
 from logthrottle import LogThrottle
 from server.media.picture import EncodedPicture
 from server.media.stream_format import ParameterMismatchError
-from server.messaging.camera_status import CONDITION_TEXTS, SUBSTREAM_AWAY, CameraStatus, motion_text
+from server.messaging.camera_status import CONDITION_TEXTS, SUBSTREAM_AWAY, CameraStatus, UnavailableCamera
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import (
@@ -26,9 +25,9 @@ from server.messaging.messages import (
     ThumbnailHeader,
     camera_of_key,
 )
+from server.service.ingest.camera_state import CameraState
 from server.service.ingest.epoch_aligner import EpochAligner
 from server.service.ingest.validation import is_plausible
-from server.service.metrics.camera_metrics import CameraMetrics
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.frame_buffer import DamagedFrameError, FrameBuffer
 
@@ -40,61 +39,6 @@ _PRESENCE_LOG_BURST, _PRESENCE_LOG_RATE = 10, 1 / 30
 """Log lines about a camera that connects or disconnects: burst, and rate per second; it may flap."""
 _THUMBNAIL_BYTES_MAX = 1 << 17
 """Larger than any thumbnail of 160 lines."""
-
-
-@dataclass(slots=True)
-class CameraState:
-    """The state of a camera as the best-view service knows it."""
-
-    alive: bool = False
-    refused: str = ""
-    """Why its frames are refused; empty: they are used."""
-    status: CameraStatus | None = None
-    ended: bool = False
-    bad_messages: int = 0
-    frames: int = 0
-    frames_without_peers: int = 0
-    """Frames that were tracked without another camera's detections."""
-    metrics: CameraMetrics = field(default_factory=CameraMetrics)
-    """Measurements for the operator."""
-
-    @property
-    def label(self) -> str:
-        """The state in one word: refused, ended, starting, live or gone."""
-        if self.refused:
-            return "refused"
-        if self.ended:
-            return "ended"
-        if not self.frames:
-            return "starting"
-        return "live" if self.alive and not self.is_source_away else "gone"
-
-    @property
-    def is_source_away(self) -> bool:
-        """Whether its source delivers no frames, by the last status of its connected process."""
-        return self.status is not None and self.status.state == "away"
-
-    @property
-    def message(self) -> str:
-        """A message to the operator about a problem; empty: none."""
-        if self.refused:
-            return self.refused
-        if self.alive and self.is_source_away:
-            return "its source delivers no frames; retrying"
-        if not self.alive or self.status is None:
-            return ""
-        texts = [SUBSTREAM_AWAY if self.status.substream == "away" else "", self.status.load]
-        if self.status.condition != "clear":
-            texts.insert(0, CONDITION_TEXTS[self.status.condition])
-        if self.status.motion is not None:
-            since = datetime.fromtimestamp(self.status.motion_since).astimezone()
-            texts.insert(0, f"{motion_text(self.status.motion)} since {since:%H:%M}: calibrate it again")
-        return "; ".join(filter(None, texts))
-
-    def count_bad_message(self, reason: Exception | str) -> None:
-        """Count an invalid message."""
-        self.bad_messages += 1
-        self.metrics.record_problem(f"invalid message: {reason}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,8 +93,19 @@ class Ingest:
         self._frame_header = msgspec.msgpack.Decoder(FrameHeader)
         self._camera_tracks = msgspec.msgpack.Decoder(CameraTracks)
         self._camera_status = msgspec.msgpack.Decoder(CameraStatus)
+        self._unavailable_camera = msgspec.msgpack.Decoder(UnavailableCamera)
         self._audio_header = msgspec.msgpack.Decoder(AudioHeader)
         self._thumbnail_header = msgspec.msgpack.Decoder(ThumbnailHeader)
+
+    @property
+    def handlers(self) -> dict[str, Callable[[Message], None]]:
+        """What receives a camera's messages by topic, but for those that others receive, too."""
+        return {
+            "video": self.video,
+            "status": self.status,
+            "unavailable": self.unavailable,
+            "thumbs/*": self.thumbnail,
+        }
 
     def alive(self, key: str, is_present: bool) -> None:
         """Record that a camera's liveliness token appeared or disappeared."""
@@ -164,7 +119,7 @@ class Ingest:
         state.status = None  # of an earlier connection
         state.metrics.reset_recent()
         if is_present:
-            state.refused, state.ended = "", False
+            state.refused, state.unavailable, state.ended = "", "", False
             self._aligner.camera_connected(camera)
         else:
             state.metrics.record_problem("its process disconnected")
@@ -256,6 +211,20 @@ class Ingest:
                 state.metrics.record_problem(SUBSTREAM_AWAY)
             elif status.condition not in {"clear", "clear" if before is None else before.condition}:
                 state.metrics.record_problem(CONDITION_TEXTS[status.condition])
+
+    def unavailable(self, message: Message) -> None:
+        """Record why a camera that is not connected cannot open its source."""
+        state, _ = self._state_of(message)
+        if state is None:
+            return
+        try:
+            reason = self._unavailable_camera.decode(message.payload).reason
+        except DECODE_ERRORS as error:
+            state.count_bad_message(error)
+            return
+        if not state.alive and reason != state.unavailable:
+            state.unavailable = reason
+            state.metrics.record_problem(reason)
 
     def thumbnail(self, message: Message) -> None:
         """Keep the newest thumbnail of a track."""

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from camsync.clock import Clock
 from logthrottle import LogThrottle
 from server.service.decision_files.live_decision_writer import LiveDecisionWriter
+from server.service.ingest.camera_state import CameraState
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.ingest.ingest import CameraState
 from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.view_selection.decider import GopDecision
 

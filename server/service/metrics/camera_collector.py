@@ -9,7 +9,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Histo
 from prometheus_client.registry import Collector
 
 from server.messaging.camera_status import CONDITION_TEXTS, CameraStatus
-from server.service.ingest.ingest import CameraState
+from server.service.ingest.camera_state import CameraState
 from server.service.metrics.camera_metrics import RecentSeconds
 from server.service.pipeline import BestViewPipeline
 

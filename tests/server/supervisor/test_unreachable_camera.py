@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import os
+import signal
 from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import msgspec
 import pytest
 import yaml
 from aiohttp import web
@@ -16,8 +19,10 @@ from fakes.media.videos import write_video
 from fakes.system.ports import free_port
 from fakes.timeouts import PATIENCE
 from server.config.running_config import ActiveConfig
+from server.config.site_config import Config
+from server.messaging.bus import Bus
+from server.messaging.messages import ZenohKeys
 from server.supervisor.camera_process import camera_process
-from server.system.errors import UnavailableError
 
 
 class LogLines(logging.Handler):
@@ -49,6 +54,9 @@ class Site:
     log_lines: LogLines
     answer: Callable[[], Awaitable[None]]
     """Let the camera answer."""
+    write: Callable[..., None]
+    """Write the configuration with the setting ``passthrough``."""
+    config: Config
 
 
 @pytest.fixture
@@ -64,24 +72,28 @@ async def begin(tmp_path: Path) -> AsyncIterator[Callable[..., Site]]:
     running_tasks: list[asyncio.Task[None]] = []
 
     def begin(width: int = 64, passthrough: str = "off") -> Site:
-        port, bus = free_port(), f"tcp/127.0.0.1:{free_port()}"
+        port, bus, sync = free_port(), f"tcp/127.0.0.1:{free_port()}", free_port()
         path = tmp_path / "site.yaml"
-        content = {
-            "site": {"name": "hall", "width": width, "height": 48},
-            "sync": {"port": free_port(), "start_timeout_s": 0.1},
-            "zenoh": {"connect": bus, "listen": bus},
-            "cameras": [
-                {"id": "c0", "source": f"http://127.0.0.1:{port}/c0.mp4", "passthrough": passthrough}
-            ],
-        }
-        path.write_text(yaml.safe_dump(content))
-        running_tasks.append(asyncio.create_task(camera_process(ActiveConfig(path), "c0")))
+
+        def write(passthrough: str) -> None:
+            source = f"http://127.0.0.1:{port}/c0.mp4"
+            content = {
+                "site": {"name": "hall", "width": width, "height": 48},
+                "sync": {"port": sync, "start_timeout_s": 0.1},
+                "zenoh": {"connect": bus, "listen": bus},
+                "cameras": [{"id": "c0", "source": source, "passthrough": passthrough}],
+            }
+            path.write_text(yaml.safe_dump(content))
+
+        write(passthrough)
+        running = ActiveConfig(path)
+        running_tasks.append(asyncio.create_task(camera_process(running, "c0")))
 
         async def answer() -> None:
             await runner.setup()
             await web.TCPSite(runner, "127.0.0.1", port).start()
 
-        return Site(running_tasks[-1], log_lines, answer)
+        return Site(running_tasks[-1], log_lines, answer, write, running.now)
 
     yield begin
     for process in running_tasks:
@@ -99,18 +111,39 @@ async def test_an_unreachable_camera_is_logged_once_and_runs_when_it_answers(
     site = begin()
     await site.log_lines.until(lambda line: "Connection refused; retrying" in line)
     await site.answer()
-    await site.log_lines.until(lambda line: line.startswith("camera c0 answers, after"))
+    await site.log_lines.until(lambda line: line.startswith("camera c0 is available, after"))
     await site.log_lines.until(lambda line: "no best-view service" in line)  # it runs
     assert sum("Connection refused" in line for line in site.log_lines.lines) == 1
 
 
-@pytest.mark.timeout(2 * PATIENCE + 10)
-async def test_an_error_of_a_camera_that_answers_late_does_not_end_others(
+@pytest.mark.timeout(3 * PATIENCE + 10)
+async def test_a_camera_whose_video_does_not_fit_once_the_site_runs_is_tried_again_and_returns(
     begin: Callable[..., Site],
 ) -> None:
-    """An error at the start ends the site, but here the others already run."""
+    """At the start such an error ends the site; here the others already run."""
     site = begin(128, "pass")
     await site.log_lines.until(lambda line: "Connection refused; retrying" in line)
-    await site.answer()
-    with pytest.raises(UnavailableError, match=r"^camera c0: passthrough: pass: its frames are 64x48"):
-        await asyncio.wait_for(site.process, PATIENCE)
+    bus, reasons = Bus.router(site.config.zenoh), asyncio.Queue[str]()
+    try:
+        keys = ZenohKeys(site.config.site.name)
+        bus.subscribe(
+            keys.camera("c0", "unavailable"),
+            lambda message: reasons.put_nowait(msgspec.msgpack.decode(message.payload)["reason"]),
+        )
+        bus.declare_alive(keys.bestview("alive"))
+        async with asyncio.timeout(PATIENCE):
+            assert "Connection refused" in await reasons.get(), "a service that comes later is told"
+            await site.answer()
+            while "Connection refused" in (reason := await reasons.get()):
+                pass
+        assert reason.startswith("passthrough: pass: its frames are 64x48, the site's 128x48")
+        misfit = f"camera c0: {reason}"
+        await site.log_lines.until(lambda line: line.startswith(misfit) and line.endswith("; retrying"))
+        assert not site.process.done()
+        site.write(passthrough="auto")
+        os.kill(os.getpid(), signal.SIGHUP)
+        await site.log_lines.until(lambda line: line.startswith("camera c0 is re-encoded: its own video"))
+        await site.log_lines.until(lambda line: line.startswith("camera c0 is available, after"))
+    finally:
+        bus.close()
+    assert sum(line.startswith(misfit) for line in site.log_lines.lines) == 1

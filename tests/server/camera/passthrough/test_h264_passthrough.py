@@ -426,9 +426,7 @@ def test_audio_is_delayed_as_much_as_the_video(network: NetworkCamera) -> None:
     assert float(listener._shift or 0) == pytest.approx(delay / FPS, abs=0.02), "to within half a frame"
 
 
-def test_a_network_camera_that_returns_with_another_size_is_unavailable(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_network_camera_that_returns_with_another_size_is_to_be_opened_again(tmp_path: Path) -> None:
     config = site("rtsp://camera", encode={"parameters": "own"})
     larger = config.site.model_copy(update={"width": 2 * WIDTH, "height": 2 * HEIGHT})
     encoder = Encoder(larger, config.encode)
@@ -440,12 +438,17 @@ def test_a_network_camera_that_returns_with_another_size_is_unavailable(
     source = PassthroughStream(str(path), {}, None, required_format(config))
     (tmp_path / "other.h264").write_bytes(other)
     (tmp_path / "other.h264").replace(path)
-    end = time.monotonic() + PATIENCE
-    while "does not fit any more" not in caplog.text:
+    end, refusal = time.monotonic() + PATIENCE, ""
+    while not refusal:
         assert time.monotonic() < end
         time.sleep(0.02)
+        try:
+            source.take(-1)
+        except UnavailableError as error:
+            refusal = str(error)
     source.close()
-    assert f"its frames are {2 * WIDTH}x{2 * HEIGHT}, the site's {WIDTH}x{HEIGHT}" in caplog.text
+    wanted = f"its frames are {2 * WIDTH}x{2 * HEIGHT}, the site's {WIDTH}x{HEIGHT} (site.width, site.height)"
+    assert refusal.endswith(f": its stream does not fit any more: {wanted}")
     units = source._waiting._units
     assert units
     assert {unit.image.shape for unit in units if unit.image is not None} == {(HEIGHT, WIDTH, 3)}

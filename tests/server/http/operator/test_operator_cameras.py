@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import aclosing
 
+import msgspec
 import pytest
 
 from camsync import Credentials, PulseClient, PulseServer
@@ -43,6 +44,19 @@ async def test_the_last_error_is_shown_until_the_next_one(site_with_people: Serv
     assert await trouble() == "its source delivers no frames; retrying"
     ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
     assert await trouble() == "its process disconnected"
+
+
+async def test_only_operators_see_why_a_camera_cannot_be_opened(site_with_people: ServedSite) -> None:
+    """The reason may name an address in the cameras' network."""
+    ingest, key = site_with_people.service.ingest, ZenohKeys("hall").camera(A, "unavailable")
+    reason = "rtsp://10.0.0.9: Connection refused"
+    ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
+    ingest.unavailable(Message(key, msgspec.msgpack.encode({"reason": reason}), b""))
+    operators, viewers = [
+        (await site_with_people.get_json(path))["cameras"][0]["message"]
+        for path in ("/api/operator/cameras", "/api/cameras")
+    ]
+    assert (operators, viewers) == (reason, "")
 
 
 async def test_the_floor_shows_calibrated_cameras_whose_size_is_known() -> None:

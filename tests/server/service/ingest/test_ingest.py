@@ -38,6 +38,8 @@ from server.service.streaming.frame_buffer import FrameBuffer
 from tracking.detectors.background.motion import Motion
 
 KEYS = ZenohKeys("hall")
+REASON = "rtsp://10.0.0.9: Connection refused"
+UNAVAILABLE = Message(KEYS.camera("c0", "unavailable"), msgspec.msgpack.encode({"reason": REASON}), b"")
 
 
 class IngestWithBuffers:
@@ -58,6 +60,7 @@ class IngestWithBuffers:
             "tracks": self.ingest.tracks,
             "status": self.ingest.status,
             "thumbs": self.ingest.thumbnail,
+            "unavailable": self.ingest.unavailable,
         }
         handlers[kind](message)
 
@@ -65,7 +68,7 @@ class IngestWithBuffers:
         return self.ingest.states[camera].bad_messages
 
 
-KINDS = ["video", "tracks", "status", "thumbs"]
+KINDS = ["video", "tracks", "status", "thumbs", "unavailable"]
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -143,6 +146,23 @@ def test_a_camera_that_was_knocked_is_to_be_calibrated_again() -> None:
     assert message.endswith(": calibrate it again")
 
 
+def test_why_a_camera_cannot_be_opened_is_for_operators_until_it_connects() -> None:
+    served = IngestWithBuffers()
+    state = served.ingest.states["c0"]
+    served.ingest.alive(KEYS.camera("c0", "alive"), is_present=False)
+    served.handle("unavailable", UNAVAILABLE)
+    assert (state.unavailable, state.message) == (REASON, "")
+    assert state.metrics.last_error is not None
+    first = state.metrics.last_error
+    assert first.text == REASON
+    served.handle("unavailable", UNAVAILABLE)
+    assert state.metrics.last_error is first, "it is recorded once"
+    served.ingest.alive(KEYS.camera("c0", "alive"), is_present=True)
+    assert state.unavailable == ""
+    served.handle("unavailable", UNAVAILABLE)
+    assert state.unavailable == "", "it was late"
+
+
 anything = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
@@ -174,6 +194,7 @@ GOOD: dict[str, Message] = {
     "tracks": tracks(camera_tracks("c0", 0, {1: SMALL})),
     "status": status("c0"),
     "thumbs": thumbnail("c0", 1, b"jpeg"),
+    "unavailable": UNAVAILABLE,
 }
 
 

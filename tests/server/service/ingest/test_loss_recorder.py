@@ -6,8 +6,8 @@ import pytest
 
 from fakes.service.scripted_cameras import CAMERAS, FPS, STRIDE, camera_tracks, epoch_of
 from server.media.stream_format import StreamFormat
+from server.service.ingest.camera_state import CameraState
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.ingest.ingest import CameraState
 from server.service.ingest.loss_recorder import LossRecorder
 from server.service.streaming.frame_buffer import FrameBuffer
 
