@@ -27,8 +27,17 @@ HALL = SimulatedHall(cameras=2, per_camera=3)
 FPS = 25.0
 
 
-def configuration(folder: Path, services: int = 2, hosts: Sequence[str] = (), **sections: Any) -> Path:
-    """Write the configuration of a site of simulated cameras; services listen on ports of `hosts`."""
+def configuration(
+    folder: Path,
+    services: int = 2,
+    hosts: Sequence[str] = (),
+    share: dict[str, Any] | None = None,
+    **sections: Any,
+) -> Path:
+    """Write the configuration of a site of simulated cameras; services listen on ports of `hosts`.
+
+    `share` and `sections` are merged into it, or replace its lists.
+    """
     hosts = hosts or ["127.0.0.1"] * services
     routers = [f"tcp/{host}:{free_port()}" for host in hosts]
     content: dict[str, Any] = {
@@ -36,14 +45,14 @@ def configuration(folder: Path, services: int = 2, hosts: Sequence[str] = (), **
         "sync": {"port": free_port(), "start_timeout_s": 3.0},
         "zenoh": {"connect": routers, "listen": routers[0]},
         "track": {"joint": False},  # simulated cameras send tracks alone
-        "view": {"share": {"servers": [f"http://{host}:{free_port()}/" for host in hosts]}},
+        "view": {"share": {"servers": [f"http://{host}:{free_port()}/" for host in hosts], **(share or {})}},
         "cameras": [
             {"id": name, "source": f"rtsp://{name}/", "ground": ground.tolist()}
             for name, ground in zip(HALL.ids, HALL.grounds, strict=True)
         ],
     }
     for name, value in sections.items():
-        content[name] = {**content.get(name, {}), **value}
+        content[name] = {**content.get(name, {}), **value} if isinstance(value, dict) else value
     path = folder / "site.yaml"
     path.write_text(yaml.safe_dump(content), encoding="utf-8")
     return path
@@ -63,7 +72,8 @@ class Process:
 
 @dataclass(slots=True)
 class SeveralServices:
-    """The processes by name (sync, bestview-0, bestview-1, cameras), their log, and each service's GOPs."""
+    """The processes by name (sync, bestview-0, bestview-1; cameras, which simulates all, or camera-c0 …), and
+    their log."""
 
     config: Path
     content: dict[str, Any]
@@ -83,6 +93,8 @@ class SeveralServices:
         if name == "cameras":
             count = [str(HALL.per_camera), "0", str(HALL.cameras)]
             words = ["benchmarks.scaling.simulated_cameras", str(self.config), *count]
+        elif name.startswith("camera-"):
+            words = ["server.cli.main", "camera", str(self.config), name.removeprefix("camera-")]
         elif match := re.fullmatch(r"bestview-(\d+)", name):
             index = int(match[1])
             address, port = self.urls[index].strip("/").rpartition("/")[2].split(":")
@@ -187,15 +199,15 @@ async def watching(url: str) -> AsyncIterator[Watcher]:
 
 @contextlib.asynccontextmanager
 async def several_services(
-    config: Path, prefixes: dict[str, list[str]] | None = None
+    config: Path, prefixes: dict[str, list[str]] | None = None, cameras: Sequence[str] = ("cameras",)
 ) -> AsyncIterator[SeveralServices]:
-    """Run a site's processes, and terminate them at the end."""
+    """Run a site's services, pulse server and cameras, and terminate them at the end."""
     content = yaml.safe_load(config.read_text(encoding="utf-8"))
     site = SeveralServices(config, content, prefixes or {})
     try:
         for index in range(len(site.urls)):
             await site.start(f"bestview-{index}")
-        for name in ("sync", "cameras"):
+        for name in ("sync", *cameras):
             await site.start(name)
         yield site
     finally:
