@@ -75,6 +75,8 @@ class Camera(msgspec.Struct, frozen=True):
     """What is wrong with the picture: covered, turned, blurred, noisy or frozen."""
     condition_since: float | None = None
     """When that began, unix seconds."""
+    covered_share: float = 0.0
+    """The share of the picture that something on the lens hides, also if the rest is clear."""
 
 
 class Choice(msgspec.Struct, frozen=True):

@@ -19,10 +19,10 @@ from camsync import ClientSettings, Pulse, PulseClient, steady_unix_clock
 from logthrottle import LogThrottle
 from server.camera.audio import LiveAudioSource, open_site_audio
 from server.camera.end_confirmation import EndConfirmation
-from server.camera.knocks import KnockLog
 from server.camera.load.load_monitor import LoadMonitor
 from server.camera.operator_corrections import CorrectionInbox
 from server.camera.peers.detection_exchange import PeerDetectionExchange
+from server.camera.picture_reports import ConditionLog, KnockLog
 from server.camera.pipeline import CameraPipeline
 from server.camera.publisher import CameraPublisher
 from server.camera.retained_identity_snapshot import RetainedIdentitySnapshot
@@ -33,9 +33,8 @@ from server.camera.tracking_backlog import TrackingBacklog
 from server.config.pulse_access import pulse_client_tls, pulse_credentials
 from server.config.site_config import Config
 from server.messaging.bus import Bus, redact_endpoints
-from server.messaging.camera_status import CONDITION_TEXTS, CameraState
+from server.messaging.camera_status import CameraState
 from server.messaging.messages import CameraTracks, ZenohKeys
-from tracking.types import PictureCondition
 
 log = logging.getLogger(__name__)
 
@@ -86,8 +85,8 @@ class CameraProcess:
         self._corrections = CorrectionInbox(camera_id, self._boot)
         self._meter = StatusMeter(fps)
         self._state: CameraState = "starting"
-        self._last_condition: PictureCondition = "clear"
-        self._condition_since = self._moved_since = 0.0
+        self._conditions = ConditionLog(camera_id)
+        self._moved_since = 0.0
         self._knocks = KnockLog(camera_id)
         self._end = 0
         """The first pulse after the recording, once that has ended."""
@@ -281,8 +280,10 @@ class CameraProcess:
             await asyncio.sleep(_STATUS_EVERY_S)
 
     def _publish_status(self) -> None:
-        condition, since = self._condition()
-        motion = self._pipeline.view.motion
+        view, motion = self._pipeline.view, self._pipeline.view.motion
+        condition, covered_share = view.condition, view.covered_share
+        lasts_s = (self._meter.pulse - view.since) / self._config.site.fps
+        self._conditions.update(condition, covered_share, self._clock() - lasts_s)
         if self._knocks.update(motion):
             self._moved_since = self._clock()
         status = self._meter.status(self._id, self._boot, self._state, len(self._backlog), self._load)
@@ -290,7 +291,8 @@ class CameraProcess:
             msgspec.structs.replace(
                 status,
                 condition=condition,
-                condition_since=since,
+                condition_since=self._conditions.since,
+                covered_share=covered_share,
                 substream=self._pipeline.tracked.state,
                 motion=motion,
                 motion_since=0.0 if motion is None else self._moved_since,
@@ -298,17 +300,6 @@ class CameraProcess:
                 bad_messages=self._exchange.bad_messages + self._corrections.bad_messages,
             )
         )
-
-    def _condition(self) -> tuple[PictureCondition, float]:
-        """Return what is wrong with the picture and since when, unix seconds; log a change."""
-        view, pulse = self._pipeline.view, self._meter.pulse
-        condition = view.condition
-        if condition != self._last_condition:
-            self._last_condition = condition
-            self._condition_since = self._clock() - (pulse - view.since) / self._config.site.fps
-            level = logging.INFO if condition == "clear" else logging.WARNING
-            log.log(level, "camera %s: %s", self._id, CONDITION_TEXTS[condition])
-        return condition, 0.0 if condition == "clear" else self._condition_since
 
     @staticmethod
     async def _run_in(pool: ThreadPoolExecutor, work: Callable[[], T]) -> T:

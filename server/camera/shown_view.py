@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from server.camera.knocks import noticeable_motion
+from server.camera.picture_reports import noticeable_motion
 from server.camera.sources.base import Image
 from server.camera.substream.picture_scale import PictureScale
 from server.messaging.camera_status import PictureMotion
@@ -93,6 +93,11 @@ class ShownView:
     def condition(self) -> PictureCondition:
         """What is wrong with the picture."""
         return self.monitor.condition
+
+    @property
+    def covered_share(self) -> float:
+        """The share of the picture that something on the lens hides, once that has lasted, 0 to 1."""
+        return 1.0 if self._is_blind else self.monitor.covered_share
 
     @property
     def since(self) -> int:

@@ -20,6 +20,15 @@ CONDITION_TEXTS: Mapping[PictureCondition, str] = {
 }
 """By condition: a text for people, its summary before the colon."""
 
+
+def picture_text(condition: PictureCondition, covered_share: float) -> str:
+    """Return what is wrong with a picture in words, also if the rest of a partly covered one is clear."""
+    if condition != "clear" or covered_share == 0.0:
+        return CONDITION_TEXTS[condition]
+    share = f"{100.0 * covered_share:.0f} % of the picture is covered"
+    return f"{share}: something is on the lens or close before it; people are tracked in the rest"
+
+
 CameraState = Literal["starting", "live", "away", "ended"]
 """State of a camera; away: its source delivers no frames now."""
 
@@ -90,6 +99,8 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     """What is wrong with the picture."""
     condition_since: Time = 0.0
     """When that began, unix seconds by the camera's clock; 0: nothing is wrong."""
+    covered_share: Annotated[float, msgspec.Meta(ge=0.0, le=1.0)] = 0.0
+    """The share of the picture that something on the lens hides, also if the rest is clear."""
     substream: SubstreamState = "none"
     """Whether people are tracked in a substream."""
     motion: PictureMotion | None = None

@@ -44,6 +44,8 @@ class PictureMonitor:
         self._stillness = StillnessMonitor()
         self._recent: deque[tuple[float, Structure]] = deque()
         self._cover = CoverFinder()
+        self._cover_agreed_s = 0.0
+        """When `covered_share` last agreed with whether anything is covered."""
         self._reference: Reference | None = None
         self._learned_s = self._unlearned_s = 0.0
         self._signs: deque[tuple[float, int, PictureCondition]] = deque()
@@ -53,6 +55,8 @@ class PictureMonitor:
         """The frame in which that began."""
         self.shows_another_scene = False
         """Whether the camera was turned away and has not come back, even if what it shows was accepted."""
+        self.covered_share = 0.0
+        """The covered share of the picture, once that has lasted; the rest may be clear."""
 
     @property
     def shows_now(self) -> bool:
@@ -83,6 +87,7 @@ class PictureMonitor:
         while self._signs[0][0] < seconds - _REPORT_S:
             self._signs.popleft()
         self._decide(seconds)
+        self._report_cover(seconds)
         if self.condition == "turned" and seconds - self.since / self._fps >= _ACCEPT_S:
             self._begin_again()
         return self.condition
@@ -96,9 +101,19 @@ class PictureMonitor:
         """Learn the reference anew; nothing is wrong until then."""
         self._reference, self._learned_s = None, 0.0
         self._cover.forget()
+        self.covered_share = 0.0
         self._signs.clear()
         if self.condition != "clear":
             self.condition, self.since = "clear", self._frame
+
+    def _report_cover(self, seconds: float) -> None:
+        """Report the share of a cover that has lasted, or that there has been none for a while."""
+        share = 0.0 if self.covered is None else float(self.covered.mean())
+        if (share > 0.0) is (self.covered_share > 0.0):
+            self._cover_agreed_s = seconds
+        elif seconds - self._cover_agreed_s < (_REPORT_S if share else _RECOVER_S):
+            return
+        self.covered_share = share
 
     def _sign(self, image: Image, seconds: float, elapsed: float) -> PictureCondition:
         """Return what seems to be wrong with a picture."""

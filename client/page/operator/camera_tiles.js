@@ -100,7 +100,7 @@ class CameraTile {
   /** @param {CameraDiagnostics} camera */
   show(camera) {
     this.item.dataset.state = camera.state;
-    this.item.classList.toggle('unclear', camera.state === 'live' && camera.condition in CONDITIONS);
+    this.item.classList.toggle('unclear', camera.state === 'live' && (camera.condition in CONDITIONS || camera.covered_share > 0));
     setText(this.state, formatState(camera));
     ROWS.forEach(([, , format], at) => setText(this.values[at][1], format(camera)));
     setText(this.error, camera.message || formatLastError(camera));
@@ -108,9 +108,10 @@ class CameraTile {
 }
 
 /** @param {CameraDiagnostics} camera */
-function formatState({ state, condition, condition_since: since }) {
+function formatState({ state, condition, condition_since: since, covered_share: covered }) {
   const wrong = state === 'live' ? CONDITIONS[condition] : undefined;
   if (wrong) return since ? `${wrong} since ${formatTime(since)}` : wrong;
+  if (state === 'live' && covered > 0) return `${Math.round(100 * covered)} % covered`;
   return STATES[state] ?? state;
 }
 

@@ -61,6 +61,7 @@
  * @property {string} message
  * @property {'clear' | 'covered' | 'turned' | 'blurred' | 'noisy' | 'frozen'} condition what is wrong with the picture
  * @property {number | null} condition_since unix seconds; null: nothing is wrong
+ * @property {number} covered_share of the picture, by something on the lens
  *
  * @typedef {object} Cut
  * @property {number} object

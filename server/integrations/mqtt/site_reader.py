@@ -33,7 +33,7 @@ class SiteReader:
             people=sum(self._is_present(person) for person in people),
             persons=self._persons(people),
             cameras=[
-                CameraState(camera.camera, camera.state, camera.condition)
+                CameraState(camera.camera, camera.state, camera.condition, camera.covered_share)
                 for camera in service.cameras.list_cameras()
             ],
             zones={zone.zone: len(zone.objects) for zone in rules.zones if zone.area is not None},

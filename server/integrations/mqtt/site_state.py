@@ -40,11 +40,17 @@ class PersonState:
 
 @dataclass(frozen=True, slots=True)
 class CameraState:
-    """A camera: ``state`` and ``condition`` as in `/api/cameras`."""
+    """A camera: ``state``, ``condition`` and ``covered_share`` as in `/api/cameras`."""
 
     camera: str
     state: str
     condition: str
+    covered_share: float = 0.0
+
+    @property
+    def has_problem(self) -> bool:
+        """Whether it does not show all that it should."""
+        return self.state != "live" or self.condition != "clear" or self.covered_share > 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,11 +150,10 @@ def state_messages(state: SiteState, topics: Topics) -> dict[str, bytes]:
         content["recording"] = on_or_off(is_on=state.recording)
     messages: dict[str, object] = {topics.state: content}
     for camera in state.cameras:
-        problem = on_or_off(is_on=camera.state != "live" or camera.condition != "clear")
         messages[topics.camera(camera.camera)] = {
             "state": camera.state,
             "condition": camera.condition,
-            "problem": problem,
+            "problem": on_or_off(is_on=camera.has_problem),
         }
     for person in state.persons:
         messages[topics.person(person.key)] = {

@@ -37,6 +37,8 @@ class CameraInfo(msgspec.Struct, frozen=True):
     """What is wrong with the picture: clear, covered, turned, blurred, noisy or frozen."""
     condition_since: float | None
     """When that began, unix seconds; null: nothing is wrong."""
+    covered_share: float
+    """The share of the picture that something on the lens hides, also if the rest is clear."""
 
 
 class ImagePlacement(msgspec.Struct, frozen=True):
@@ -157,6 +159,7 @@ class CameraService:
             message=state.message,
             condition=status.condition if status else "clear",
             condition_since=(status.condition_since or None) if status else None,
+            covered_share=status.covered_share if status else 0.0,
         )
 
     def _diagnostics(self, camera: str, state: CameraState) -> CameraDiagnostics:

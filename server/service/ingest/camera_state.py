@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from datetime import datetime
 
-from server.messaging.camera_status import CONDITION_TEXTS, SUBSTREAM_AWAY, CameraStatus, motion_text
+from server.messaging.camera_status import SUBSTREAM_AWAY, CameraStatus, motion_text, picture_text
 from server.service.metrics.camera_metrics import CameraMetrics
 
 
@@ -53,8 +53,8 @@ class CameraState:
         if not self.alive or self.status is None:
             return ""
         texts = [SUBSTREAM_AWAY if self.status.substream == "away" else "", self.status.load]
-        if self.status.condition != "clear":
-            texts.insert(0, CONDITION_TEXTS[self.status.condition])
+        if self.status.condition != "clear" or self.status.covered_share:
+            texts.insert(0, picture_text(self.status.condition, self.status.covered_share))
         if self.status.motion is not None:
             since = datetime.fromtimestamp(self.status.motion_since).astimezone()
             texts.insert(0, f"{motion_text(self.status.motion)} since {since:%H:%M}: calibrate it again")

@@ -14,7 +14,13 @@ from camsync.lines import RateLimit
 from logthrottle import LogThrottle
 from server.media.picture import EncodedPicture
 from server.media.stream_format import ParameterMismatchError
-from server.messaging.camera_status import CONDITION_TEXTS, SUBSTREAM_AWAY, CameraStatus, UnavailableCamera
+from server.messaging.camera_status import (
+    CONDITION_TEXTS,
+    SUBSTREAM_AWAY,
+    CameraStatus,
+    UnavailableCamera,
+    picture_text,
+)
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import (
@@ -204,6 +210,7 @@ class Ingest:
             state.count_bad_message(error)
         else:
             was_away, before = state.is_source_away, state.status
+            was_covered = before is not None and before.covered_share > 0.0
             state.status = status
             if state.is_source_away and not was_away:
                 state.metrics.record_problem(state.message)
@@ -211,6 +218,8 @@ class Ingest:
                 state.metrics.record_problem(SUBSTREAM_AWAY)
             elif status.condition not in {"clear", "clear" if before is None else before.condition}:
                 state.metrics.record_problem(CONDITION_TEXTS[status.condition])
+            elif status.condition == "clear" and status.covered_share and not was_covered:
+                state.metrics.record_problem(picture_text("clear", status.covered_share))
 
     def unavailable(self, message: Message) -> None:
         """Record why a camera that is not connected cannot open its source."""

@@ -47,6 +47,11 @@ class CameraCollector(Collector):
             "Load-shedding level of the camera; 0: none.",
             _of_status(lambda status: status.load_level),
         )
+        yield self._gauge(
+            "covered_share",
+            "Share of the picture that something on the lens hides.",
+            _of_status(lambda status: status.covered_share),
+        )
         for name, description, spread in _SPREADS:
             yield self._spread(name, description, spread)
         late, lost = self._pipeline.aligner.late_messages, self._pipeline.loss_recorder.lost_frames

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import pytest
 
-from server.camera.knocks import KnockLog, noticeable_motion
+from server.camera.picture_reports import KnockLog, noticeable_motion
 from server.camera.pipeline import CameraPipeline
 from server.camera.shown_view import ShownView
 from server.camera.sources import Image, SourceEndedError
@@ -142,8 +142,8 @@ def test_a_camera_whose_lens_is_covered_in_part_shows_its_place_in_the_rest() ->
     room, random = KnockedCamera().take(0), np.random.default_rng(0)
     detector = BackgroundDetector()
     view = ShownView(10.0, detector, SCALE)
-    shares = []
-    for frame in range(90):
+    shares, reported = [], []
+    for frame in range(110):
         picture = np.clip(room + 2.0 * random.standard_normal(room.shape), 0, 255).astype(np.uint8)
         if 50 <= frame < 80:
             picture[:, : SIZE[0] // 2] = (40, 60, 150)
@@ -153,11 +153,14 @@ def test_a_camera_whose_lens_is_covered_in_part_shows_its_place_in_the_rest() ->
         view.observe(picture, frame)
         shares.append(areas(view.hidden).sum() / (SIZE[0] * SIZE[1]))
         assert view.shows_its_place
+        reported.append(view.covered_share)
         if frame == 75:
             ignored = 1.0 - np.count_nonzero(detector.grid.visible) / detector.grid.visible.size
             assert ignored == pytest.approx(0.5, abs=0.1)
     assert shares[75] == pytest.approx(0.5, abs=0.1)
     assert shares[49] == shares[-1] == 0.0
+    assert (reported[60], reported[-1]) == (0.0, 0.0)
+    assert max(reported) == pytest.approx(0.5, abs=0.1), "it is reported once it has lasted"
 
 
 def test_a_partly_covered_lens_that_goes_dark_shows_nothing() -> None:
@@ -172,7 +175,7 @@ def test_a_partly_covered_lens_that_goes_dark_shows_nothing() -> None:
         view.observe(np.full_like(room, 20) if frame >= 50 else picture, frame)
         shares.append(areas(view.hidden).sum() / (SIZE[0] * SIZE[1]))
     assert shares[49] == pytest.approx(0.5, abs=0.1)
-    assert (view.condition, shares[-1]) == ("covered", 1.0)
+    assert (view.condition, shares[-1], view.covered_share) == ("covered", 1.0, 1.0)
 
 
 def test_a_view_that_is_lost_for_long_without_a_turn_lies_where_it_lay() -> None:

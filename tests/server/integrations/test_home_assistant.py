@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 from typing import Any
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -81,6 +82,19 @@ def test_states_of_a_person() -> None:
     assert json.loads(published[TOPICS.camera("c1")])["problem"] == "ON"
     assert published[TOPICS.rule("queue")] == b"ON"
     assert TOPICS.rule("in") not in published
+
+
+@pytest.mark.parametrize(
+    ("camera", "problem"),
+    [
+        (CameraState("c0", "live", "clear"), "OFF"),
+        (CameraState("c0", "live", "blurred"), "ON"),
+        (CameraState("c0", "live", "clear", 0.3), "ON"),
+    ],
+)
+def test_a_camera_that_does_not_show_all_has_a_problem(camera: CameraState, problem: str) -> None:
+    published = state_messages(replace(STATE, cameras=[camera]), TOPICS)
+    assert json.loads(published[TOPICS.camera("c0")])["problem"] == problem
 
 
 def test_a_site_that_does_not_record_has_no_switch() -> None:

@@ -102,6 +102,22 @@ def test_a_small_part_is_covered_after_seconds() -> None:
     assert shares[round(4.0 * FPS)] > 0.06
 
 
+def test_the_share_of_a_cover_is_reported_once_it_has_lasted_until_it_has_been_gone() -> None:
+    def passing(image: Image, seconds: float) -> Image:
+        return painted(image, seconds) if seconds < 1.0 or 6.0 <= seconds < 16.0 else image
+
+    monitor, reported = known_room(), {}
+    for frame in range(round(KNOWN_S * FPS), round((KNOWN_S + 22.0) * FPS)):
+        seconds = round(frame / FPS - KNOWN_S, 1)
+        monitor.observe(noisy(passing(room(), seconds), frame), frame)
+        reported[seconds] = monitor.covered_share
+    assert {share for seconds, share in reported.items() if seconds < 8.5} == {0.0}, "a bird is no cover"
+    assert [reported[seconds] for seconds in (10.0, 15.0)] == pytest.approx([0.43, 0.43], abs=0.05)
+    assert reported[17.0] > 0.0
+    assert {share for seconds, share in reported.items() if seconds >= 19.0} == {0.0}
+    assert monitor.condition == "clear"
+
+
 def test_a_wholly_covered_lens_shows_nothing() -> None:
     monitor = known_room()
     watch(monitor, lambda image, _: np.full_like(image, 20), 5.0, KNOWN_S)

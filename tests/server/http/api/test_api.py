@@ -95,6 +95,7 @@ async def test_the_cameras_are_listed_with_their_state(site_with_people: ServedS
         "message": "",
         "condition": "clear",
         "condition_since": None,
+        "covered_share": 0.0,
     }
     assert c1["state"] == "live"
     async with site_with_people.session.get("/readyz") as answer:
@@ -112,6 +113,18 @@ async def test_the_condition_of_a_cameras_picture_is_listed_and_measured(
         lines = (await answer.text()).splitlines()
     assert f'myview_camera_condition{{camera="{A}",condition="frozen"}} 1.0' in lines
     assert f'myview_camera_condition{{camera="{A}",condition="clear"}} 0.0' in lines
+
+
+async def test_the_covered_share_of_a_cameras_picture_is_listed_and_measured(
+    site_with_people: ServedSite,
+) -> None:
+    site_with_people.service.ingest.status(status(A, covered_share=0.35))
+    c0, c1 = (await site_with_people.get_json("/api/cameras"))["cameras"]
+    assert (c0["covered_share"], c0["condition"], c1["covered_share"]) == (0.35, "clear", 0.0)
+    assert c0["message"].startswith("35 % of the picture is covered: ")
+    async with site_with_people.session.get("/metrics") as answer:
+        lines = (await answer.text()).splitlines()
+    assert f'myview_camera_covered_share{{camera="{A}"}} 0.35' in lines
 
 
 async def test_a_refused_camera_is_listed_with_the_reason(site_with_people: ServedSite) -> None:

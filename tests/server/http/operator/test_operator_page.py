@@ -345,6 +345,10 @@ async def test_a_tile_says_what_is_wrong_with_the_picture(browser: Browser) -> N
         tile = page.locator(".camera-tile").first
         await expect(tile.locator(".state")).to_contain_text("Turned away since ")
         await expect(tile.locator(".last-error")).to_contain_text("the camera is turned away: ")
+        served.service.ingest.status(status(A, covered_share=0.35))
+        await expect(tile.locator(".state")).to_have_text("35 % covered")
+        await expect(tile).to_have_class("camera-tile unclear")
+        await expect(tile.locator(".last-error")).to_contain_text("35 % of the picture is covered: ")
         served.service.ingest.status(status(A))
         await expect(tile.locator(".state")).to_have_text("Live")
 

@@ -123,6 +123,24 @@ def test_a_picture_that_is_not_clear_is_the_cameras_message_and_its_last_error()
     assert state.message == ""
 
 
+def test_a_partly_covered_picture_is_the_cameras_message_and_its_last_error() -> None:
+    served = IngestWithBuffers()
+    state = served.ingest.states["c0"]
+    served.handle("status", status("c0", covered_share=0.304, load="busy"))
+    assert state.message.startswith("30 % of the picture is covered: ")
+    assert state.message.endswith("; busy")
+    first = state.metrics.last_error
+    assert first is not None
+    assert first.text.startswith("30 % of the picture is covered: ")
+    served.handle("status", status("c0", covered_share=0.39))
+    assert state.message.startswith("39 % of the picture is covered: ")
+    assert state.metrics.last_error == first, "it is recorded once"
+    served.handle("status", status("c0", covered_share=0.5, condition="covered", condition_since=5.0))
+    assert state.message.startswith("the lens is covered: ")
+    served.handle("status", status("c0"))
+    assert state.message == ""
+
+
 def test_a_substream_without_pictures_is_the_cameras_message_and_its_last_error() -> None:
     served = IngestWithBuffers()
     state = served.ingest.states["c0"]

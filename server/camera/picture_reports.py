@@ -1,4 +1,4 @@
-"""How far a camera was knocked or turned, as messages and log lines say it."""
+"""What is wrong with a camera's picture, and how far it was knocked, as messages and log lines say it."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ import logging
 import numpy as np
 from numpy.typing import NDArray
 
-from server.messaging.camera_status import PictureMotion, motion_text
+from server.messaging.camera_status import PictureMotion, motion_text, picture_text
 from server.messaging.picture_motion import picture_motion
 from tracking.homographies import map_points
+from tracking.types import PictureCondition
 
 Floats = NDArray[np.float64]
 
@@ -45,3 +46,26 @@ class KnockLog:
             log.info("camera %s is where it was", self._camera)
         self._moved = moved
         return began
+
+
+class ConditionLog:
+    """Logs when something else is wrong with a camera's picture, or nothing any more."""
+
+    def __init__(self, camera_id: str) -> None:
+        self._camera = camera_id
+        self._condition: PictureCondition = "clear"
+        self._is_partly_covered = False
+        self.since = 0.0
+        """When the condition began, unix seconds; 0: nothing is wrong."""
+
+    def update(self, condition: PictureCondition, covered_share: float, began: float) -> None:
+        """Record the condition, which began at some unix seconds, and the covered share of the picture."""
+        is_partly_covered = condition == "clear" and covered_share > 0.0
+        if condition == self._condition and is_partly_covered is self._is_partly_covered:
+            return
+        if condition != self._condition:
+            self.since = 0.0 if condition == "clear" else began
+        self._condition, self._is_partly_covered = condition, is_partly_covered
+        is_fine = condition == "clear" and not is_partly_covered
+        level = logging.INFO if is_fine else logging.WARNING
+        log.log(level, "camera %s: %s", self._camera, picture_text(condition, covered_share))
