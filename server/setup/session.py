@@ -105,6 +105,8 @@ class SetupSession:
     """Where the earlier file is, after writing."""
     written: asyncio.Event = field(default_factory=asyncio.Event)
     """Set when the configuration is written."""
+    sizes: dict[str, tuple[int, int]] = field(default_factory=dict)
+    """Width and height of the pictures of sources that were tried, the latest."""
     _found: dict[tuple[str, int], FoundCamera] = field(default_factory=dict)
     """Cameras that any search has found, by address and port: several operators may search."""
     _streams: dict[int, CameraAddress] = field(default_factory=dict)
@@ -192,6 +194,8 @@ class SetupSession:
         trial = await self._limited(try_stream, StreamRequest(address.with_password, address.options, site))
         if trial.error:
             raise UserError(f"{which}{address.shown}: {trial.error}")
+        self.sizes[address.source] = trial.width, trial.height
+        _keep_latest(self.sizes, _MAX_STREAMS)
         return TriedStream(address, trial)
 
     async def _limited(self, ask: Callable[[Request], Awaitable[Answer]], request: Request) -> Answer:

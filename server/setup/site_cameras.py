@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from server.config.loader import load_config, read_content
 from server.setup.camera_address import check_name, free_name
+from server.setup.camera_pixels import CameraPixels, follow_size
 from server.setup.ground import read_ground
 from server.setup.session import TriedCamera
 from server.setup.site_file import camera_entry, check_text, password_file, replace_file, write_passwords
+from server.setup.site_pixels import Size
 from server.setup.yaml_edit import changed_lists_text
 from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
@@ -70,15 +73,27 @@ def add_camera(path: Path, tried: TriedCamera) -> None:
     if ground is not None:
         taken |= ground.content["homography"].keys()
     camera = tried.as_new(free_name(tried.name, taken))
-    text = _checked_text(path, [*cameras, camera_entry(camera, path)])
+    text = _checked_text(path, {"cameras": [*cameras, camera_entry(camera, path)]})
     write_passwords([camera], path)
     replace_file(text, path)
 
 
-def readdress_camera(path: Path, camera_id: str, tried: TriedCamera) -> None:
+def readdress_camera(
+    path: Path, camera_id: str, tried: TriedCamera, sizes: Mapping[str, Size] = MappingProxyType({})
+) -> str:
     """Change a camera's address and login to those of one that was tried; its other settings stay.
 
-    The password has a new file: the running camera and the earlier configuration use the earlier one.
+    What is in pixels follows the size of its picture. The password has a new file: the running camera and the
+    earlier configuration use the earlier one.
+
+    Args:
+        path: the configuration file.
+        camera_id: the camera.
+        tried: what it becomes.
+        sizes: sizes of pictures by source, as far as they are known.
+
+    Returns:
+        what has become of settings in pixels, or what must be redone, in a line; empty: nothing.
 
     Raises:
         UserError: there is no such camera, another one has this address, or the files would be invalid or
@@ -96,10 +111,26 @@ def readdress_camera(path: Path, camera_id: str, tried: TriedCamera) -> None:
     is_same_view = str(earlier.get("source")) == tried.address.source
     replaced = {"source", "password", "options"} | (set() if is_same_view else {"substream"})
     other = {key: value for key, value in earlier.items() if key not in replaced}
-    changed = {**other, **entry, "id": camera_id}
-    text = _checked_text(path, [changed if camera is earlier else camera for camera in cameras])
+    ground, zones = read_ground(path), read_content(path).get("zones") or []
+    present = CameraPixels(
+        {**other, **entry, "id": camera_id}, zones, {} if ground is None else ground.content
+    )
+    before = sizes.get(load_config(path).camera(camera_id).source)
+    changed = follow_size(present, before, (tried.trial.width, tried.trial.height))
+    lists = {"cameras": [changed.entry if camera is earlier else camera for camera in cameras]}
+    text = _checked_text(path, lists | ({"zones": changed.zones} if changed.zones != zones else {}))
     write_passwords([new], path)
-    replace_file(text, path)
+    if ground is None or changed.ground == ground.content:
+        replace_file(text, path)
+        return changed.note
+    kept = replace_file(json.dumps(changed.ground), ground.file)
+    try:
+        replace_file(text, path)
+    except UserError:
+        if kept is not None:
+            kept.replace(ground.file)
+        raise
+    return changed.note
 
 
 def rename_camera(path: Path, camera_id: str, name: str) -> None:
@@ -114,7 +145,7 @@ def rename_camera(path: Path, camera_id: str, name: str) -> None:
     if any(str(camera.get("id")) == name for camera in cameras):
         raise UserError(f"another camera is called {name}")
     renamed = [{**camera, "id": name} if str(camera.get("id")) == camera_id else camera for camera in cameras]
-    text = _checked_text(path, renamed)
+    text = _checked_text(path, {"cameras": renamed})
     _copy_homography(path, camera_id, name)  # first: with both names, either configuration is calibrated
     replace_file(text, path)
 
@@ -130,7 +161,7 @@ def remove_camera(path: Path, camera_id: str) -> None:
     remaining = [camera for camera in cameras if str(camera.get("id")) != camera_id]
     if not remaining:
         raise UserError("a site has at least one camera: add another one first")
-    replace_file(_checked_text(path, remaining), path)
+    replace_file(_checked_text(path, {"cameras": remaining}), path)
 
 
 def _cameras(path: Path) -> list[_Entry]:
@@ -160,8 +191,8 @@ def _cameras_to_change(path: Path, camera_id: str) -> list[_Entry]:
     return cameras
 
 
-def _checked_text(path: Path, cameras: list[_Entry]) -> str:
-    text = changed_lists_text(path, {"cameras": cameras})
+def _checked_text(path: Path, lists: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
+    text = changed_lists_text(path, lists)
     check_text(text, path)
     return text
 

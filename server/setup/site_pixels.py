@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
 from server.media.letterbox import Letterbox
+from server.setup.yaml_edit import plain_numbers
 from server.system.errors import UserError
 from tracking import CostSettings
 
@@ -49,7 +50,7 @@ def find_change(before: Size, after: Size, pictures: Collection[Size]) -> Pictur
         after: width and height.
         pictures: sizes of all cameras' own pictures; needed only if the shape changes.
     """
-    if _fills(before, after):
+    if has_same_shape(before, after):
         return _change(before, before, after)
     found = [_change(size, before, after) for size in pictures]
     corners = [(0, 0), before]
@@ -80,7 +81,7 @@ def moved_settings(
         return {}
     names = ", ".join([*(["detect.ignore"] if areas else []), *(f"track.costs.{name}" for name in costs)])
     unknown = [camera for camera in config.camera_ids if camera not in pictures]
-    if unknown and not _fills(config.site.size, after):
+    if unknown and not has_same_shape(config.site.size, after):
         raise UserError(
             f"{names}: in pixels of the site's picture; how they move is not known without the picture of "
             f"camera {', '.join(unknown)}: keep its shape, or wait until the camera sends"
@@ -94,7 +95,9 @@ def moved_settings(
         )
     moved: dict[str, dict[str, Any]] = {}
     if areas:
-        moved["detect"] = {"ignore": [change.move(area).round(_DIGITS).tolist() for area in areas]}
+        moved["detect"] = {
+            "ignore": [plain_numbers(change.move(area).round(_DIGITS).tolist()) for area in areas]
+        }
     if costs:
         factors = {name: 1 / change.scale if name in _PER_PIXEL else change.scale for name in costs}
         scaled = {name: float(f"{value * factors[name]:.6g}") for name, value in costs.items()}
@@ -124,8 +127,8 @@ def _check_scenes(config: Config) -> None:
             )
 
 
-def _fills(before: Size, after: Size) -> bool:
-    """Return whether two sizes have one shape."""
+def has_same_shape(before: Size, after: Size) -> bool:
+    """Return whether two sizes have one shape, to the pixel."""
     _, _, width, height = Letterbox(before, after).content
     return max(after[0] - width, after[1] - height) <= 1
 

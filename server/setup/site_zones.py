@@ -10,7 +10,7 @@ from typing import Any
 from server.config.loader import check_section, load_config, read_content
 from server.config.sections import RuleSettings, ZoneSettings
 from server.setup.site_file import check_text, replace_file
-from server.setup.yaml_edit import changed_lists_text
+from server.setup.yaml_edit import changed_lists_text, plain_numbers
 from server.system.errors import UserError
 
 _Entry = dict[str, Any]
@@ -119,7 +119,7 @@ def _with_rules(
     for number, each in enumerate(wanted, start=1):
         given = {**each, "zone": zone}
         entry = {
-            key: _plain(given[key])
+            key: plain_numbers(given[key])
             for key in RuleSettings.model_fields
             if given.get(key) not in (None, *_ALWAYS.get(key, ()))
         }
@@ -140,15 +140,8 @@ def _meaning(rule: RuleSettings) -> dict[str, Any]:
 
 def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> _Entry:
     """Return a zone with new values, and with the tolerances of an earlier one."""
-    given = {key: _plain(new[key]) for key in _ZONE_KEYS if new.get(key) is not None}
+    given = {key: plain_numbers(new[key]) for key in _ZONE_KEYS if new.get(key) is not None}
     return {**given, **{key: value for key, value in old.items() if key not in _ZONE_KEYS}}
-
-
-def _plain(value: Any) -> Any:
-    """Return a value as people write it: whole numbers without a fraction, lists of lists."""
-    if isinstance(value, float) and value.is_integer():
-        return int(value)
-    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def _write(path: Path, zones: Sequence[_Entry], rules: Sequence[_Entry]) -> None:

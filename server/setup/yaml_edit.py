@@ -65,6 +65,13 @@ def changed_values_text(path: Path, sections: Mapping[str, Mapping[str, Any]]) -
     return text
 
 
+def plain_numbers(value: Any) -> Any:
+    """Return a value as people write it: whole numbers without a fraction, lists of lists."""
+    if isinstance(value, float) and value.is_integer():
+        return int(value)
+    return [plain_numbers(item) for item in value] if isinstance(value, list | tuple) else value
+
+
 def _with_values(text: str, section: str, values: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
     with contextlib.suppress(yaml.YAMLError):
         changed = text

@@ -43,11 +43,12 @@ export class SiteCameras {
   async #tryCamera(trial) {
     const camera = this.#instead.value;
     const wanted = { ...trial, name: this.#name.value.trim() || trial.name, camera };
-    this.#show((await requestOperator('site_cameras', 'POST', wanted, CAMERA_TIMEOUT_MS)).cameras);
+    const { cameras, note } = await requestOperator('site_cameras', 'POST', wanted, CAMERA_TIMEOUT_MS);
+    this.#show(cameras);
     this.#name.value = this.#instead.value = '';
     this.#name.disabled = false;
     await this.fileChanged();
-    return camera ? `is the address of ${camera} now` : 'was added';
+    return camera ? `is the address of ${camera} now${note && `; ${note}`}` : 'was added';
   }
 
   /** @param {SiteCamera[]} cameras */

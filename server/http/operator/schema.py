@@ -67,6 +67,8 @@ class SiteCameras(msgspec.Struct, frozen=True):
     """The cameras in the configuration file, which may differ from those in force."""
 
     cameras: list[SiteCamera]
+    note: str = ""
+    """What has become of settings in pixels of a camera that got another address, or must be redone."""
 
 
 class SearchedCamera(msgspec.Struct, frozen=True):

@@ -10,7 +10,7 @@ import msgspec
 from aiohttp import web
 
 from server.http.access.permissions import OPERATOR_PATH
-from server.http.app_keys import SETUP
+from server.http.app_keys import SERVICE, SETUP
 from server.http.json_responses import error_response, json_response, read_json
 from server.http.operator.camera_search import CameraTrial, Name
 from server.http.operator.config_file import change_config, config_path
@@ -72,7 +72,8 @@ async def post_site_camera(request: web.Request) -> web.Response:
     except UserError as error:
         return error_response(400, str(error))
     if wanted.camera:
-        return await _answer(request, lambda path: readdress_camera(path, wanted.camera, tried))
+        sizes = _known_sizes(request)
+        return await _answer(request, lambda path: readdress_camera(path, wanted.camera, tried, sizes))
     return await _answer(request, lambda path: add_camera(path, tried))
 
 
@@ -90,13 +91,24 @@ async def delete_site_camera(request: web.Request) -> web.Response:
     return await _answer(request, lambda path: remove_camera(path, wanted.camera))
 
 
-async def _answer(request: web.Request, change: Callable[[Path], None]) -> web.Response:
+async def _answer(request: web.Request, change: Callable[[Path], str | None]) -> web.Response:
     """Change the file, and return its cameras."""
     try:
         path = config_path(request)
-        await change_config(path, change)
+        note = await change_config(path, change)
         listed = await asyncio.to_thread(list_cameras, path)
     except UserError as error:
         return error_response(409, str(error))
     cameras = [SiteCamera(camera.id, camera.address, camera.substream) for camera in listed]
-    return json_response(SiteCameras(cameras))
+    return json_response(SiteCameras(cameras, note or ""))
+
+
+def _known_sizes(request: web.Request) -> dict[str, tuple[int, int]]:
+    """Return the sizes of pictures by source: of cameras that send, of what was tried, of those that sent."""
+    service = request.app[SERVICE]
+    sent, sends = dict[str, tuple[int, int]](), dict[str, tuple[int, int]]()
+    for camera in service.cameras.diagnose_cameras():
+        if camera.picture is not None:
+            known = sends if camera.state == "live" else sent
+            known[service.config.camera(camera.camera).source] = camera.picture.width, camera.picture.height
+    return {**sent, **request.app[SETUP].sizes, **sends}

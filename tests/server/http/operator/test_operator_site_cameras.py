@@ -8,6 +8,7 @@ from contextlib import aclosing
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from fakes.http.tokens import bearer, serve_with_tokens
@@ -15,8 +16,10 @@ from fakes.media.rtsp_camera import RtspCamera
 from fakes.service.fed_site import ServedSite, serve_site
 from fakes.service.scripted_cameras import FPS, HEIGHT, WIDTH, encoded
 from fakes.setup.onvif_camera import FakeProfile, OnvifCamera, onvif_cameras
+from server.camera.encoder import Encoder
 from server.config.camera_password import fill_in_password
 from server.config.loader import load_config
+from server.config.sections import EncodeSettings, SiteSettings
 from server.http.access.csrf import CSRF_HEADER
 from server.http.app_keys import SiteControl
 from server.setup.camera_address import parse_address
@@ -64,18 +67,18 @@ async def send(
 
 
 async def test_a_camera_is_tried_added_renamed_and_removed(site: ServedSite, stream: RtspCamera) -> None:
-    assert await site.get_json(PATH) == {"cameras": BEFORE}
+    assert await site.get_json(PATH) == {"cameras": BEFORE, "note": ""}
     wanted = {"address": stream.url, "user": LOGIN[0], "password": LOGIN[1], "name": "Front door"}
     shown = stream.url.replace("live", "...")
     assert await send(site, "POST", wanted) == (
         200,
-        {"cameras": [*BEFORE, listed("Front-door", shown)]},
+        {"cameras": [*BEFORE, listed("Front-door", shown)], "note": ""},
     )
     assert await send(site, "PUT", {"camera": "Front-door", "name": "door"}) == (
         200,
-        {"cameras": [*BEFORE, listed("door", shown)]},
+        {"cameras": [*BEFORE, listed("door", shown)], "note": ""},
     )
-    assert await send(site, "DELETE", {"camera": "door"}) == (200, {"cameras": BEFORE})
+    assert await send(site, "DELETE", {"camera": "door"}) == (200, {"cameras": BEFORE, "note": ""})
 
 
 async def test_a_camera_gets_the_address_of_one_that_was_tried(site: ServedSite, stream: RtspCamera) -> None:
@@ -83,9 +86,29 @@ async def test_a_camera_gets_the_address_of_one_that_was_tried(site: ServedSite,
     shown = stream.url.replace("live", "...")
     assert await send(site, "POST", wanted) == (
         200,
-        {"cameras": [listed("c0", shown), BEFORE[1]]},
+        {"cameras": [listed("c0", shown), BEFORE[1]], "note": ""},
     )
     assert await send(site, "POST", {**wanted, "camera": "c7"}) == (409, {"error": "there is no camera 'c7'"})
+
+
+async def test_what_is_in_pixels_follows_the_pictures_that_were_tried(
+    site: ServedSite, stream: RtspCamera, path: Path
+) -> None:
+    path.write_text(f"{TEXT}zones: [{{id: till, camera: c0, area: [[0, 0], [40, 0], [40, 30]]}}]\n")
+    size = 2 * WIDTH, 2 * HEIGHT
+    encoder = Encoder(SiteSettings(width=size[0], height=size[1], fps=FPS), EncodeSettings(gop_s=5 / FPS))
+    blank = np.zeros((*size[::-1], 3), dtype=np.uint8)
+    units = [encoder.encode(pulse, blank) for pulse in range(40)]
+    larger = RtspCamera([units[at : at + 5] for at in range(0, 40, 5)], FPS, live=True)
+    login = {"user": LOGIN[0], "password": LOGIN[1]}
+    try:
+        _, first = await send(site, "POST", {"address": stream.url, **login, "camera": "c0"})
+        assert first["note"] == "the size of its earlier picture is not known: check its zone till"
+        _, second = await send(site, "POST", {"address": larger.url, "camera": "c0"})
+    finally:
+        larger.close()
+    assert second["note"] == "scaled from 64x48 to 128x96: its zone till"
+    assert load_config(path).zones[0].area == [(0, 0), (80, 0), (80, 60)]
 
 
 @pytest.mark.parametrize(
@@ -217,7 +240,7 @@ async def test_only_operators_see_or_change_the_configured_cameras(path: Path, t
         assert path.read_text() == TEXT
         assert await send(site, "DELETE", REMOVE, {**CHANGES, **bearer("lead")}) == (
             200,
-            {"cameras": BEFORE[1:]},
+            {"cameras": BEFORE[1:], "note": ""},
         )
 
 
