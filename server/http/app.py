@@ -36,6 +36,7 @@ from server.http.hls import routes as hls
 from server.http.metrics import http_collector
 from server.http.metrics.http_collector import register_metrics
 from server.http.operator import routes as operator
+from server.http.operator.trials import add_trials
 from server.http.streams import jpeg, video, whep
 from server.http.streams.request_validation import check_container, validate_query
 from server.http.streams.whep_sessions import WHEP_SESSIONS, WhepSessions
@@ -96,6 +97,7 @@ def make_app(
     app[SERVICE], app[ON_DISK], app[FAILURES] = service, on_disk, LogThrottle()
     app[CONTROL] = control = control or SiteControl()
     app[SETUP] = SetupSession(control.path or Path())
+    add_trials(app)
     app[EVENTS], app[TRAFFIC] = Events(service), Traffic()
     for slots in (VIEWER_SLOTS, EVENT_SLOTS, SEARCH_SLOTS, RENDER_SLOTS):
         app[slots] = FairShare()

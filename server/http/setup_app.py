@@ -23,7 +23,8 @@ from server.http.access.sessions import SESSION_LIFETIME_S
 from server.http.app_keys import SETUP
 from server.http.error_responses import FAILURES, answer_errors, note_begun
 from server.http.json_responses import error_response, json_response, read_json
-from server.http.operator import camera_search, setup
+from server.http.operator import camera_search, setup, trials
+from server.http.operator.trials import add_trials
 from server.setup.session import SetupSession
 from server.system.errors import UserError, reason_of
 
@@ -112,7 +113,9 @@ def make_setup_app(session: SetupSession, access: SetupAccess) -> web.Applicatio
     app = web.Application(middlewares=[answer_errors, _guard], client_max_size=_BODY_MAX_BYTES)
     app[SETUP], app[_ACCESS], app[FAILURES] = session, access, LogThrottle()
     app.add_routes(_routes)
+    add_trials(app)
     app.add_routes(camera_search.routes)
+    app.add_routes(trials.routes)
     app.add_routes(setup.routes)
     app.on_response_prepare.append(note_begun)
     return app

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import itertools
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from server.config.loader import check_section
 from server.config.sections import SiteSettings
@@ -37,8 +38,6 @@ _MAX_FOUND = 1024
 """Found cameras that are remembered, the latest."""
 _MAX_STREAMS = 4096
 """Offered streams that are remembered, the latest: a site may run for months."""
-Request = TypeVar("Request")
-Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +112,8 @@ class SetupSession:
     """Streams that cameras offered, by key, with their passwords."""
     _keys: itertools.count[int] = field(default_factory=lambda: itertools.count(1))
     _trials: asyncio.Semaphore = field(default_factory=lambda: asyncio.Semaphore(_TRIALS_AT_ONCE))
-    _waiting: int = 0
+    _queue: list[asyncio.Task[Any] | None] = field(default_factory=list)
+    """Tasks that speak to a camera, or wait for that, in order."""
 
     async def discover(self, seconds: float = DISCOVERY_S) -> Sequence[FoundCamera]:
         """Look for cameras in the network.
@@ -141,7 +141,8 @@ class SetupSession:
         if camera is None:
             raise UserError("no such camera was found; search again")
         request = ProfilesRequest(host, port, user, password, camera.encrypted)
-        answer = await self._limited(list_profiles, request)
+        async with self._turn():
+            answer = await list_profiles(request)
         keys = []
         for profile in answer.profiles:
             key = next(self._keys)
@@ -166,14 +167,18 @@ class SetupSession:
         Raises:
             UserError: it is in the list already, or no picture arrives.
         """
+        self._check_addable(addresses)
+        camera = await self.try_camera(addresses, name)
+        self._check_addable(addresses)  # others were added meanwhile
+        camera = replace(camera, name=free_name(name, {camera.name for camera in self.cameras}))
+        self.cameras.append(camera)
+        return camera
+
+    def _check_addable(self, addresses: CameraAddresses) -> None:
         if any(camera.address.source == addresses.source.source for camera in self.cameras):
             raise UserError(f"{addresses.source.shown}: this camera is in the list already")
         if len(self.cameras) >= MAX_CAMERAS:
             raise UserError(f"a site set up here has at most {MAX_CAMERAS} cameras")
-        camera = await self.try_camera(addresses, name)
-        camera = replace(camera, name=free_name(name, {camera.name for camera in self.cameras}))
-        self.cameras.append(camera)
-        return camera
 
     async def try_camera(
         self, addresses: CameraAddresses, name: str = "", passed_into: Path | None = None
@@ -185,33 +190,40 @@ class SetupSession:
         Raises:
             UserError: no picture arrives, or it does not fit.
         """
-        source = await self._tried(addresses.source, site="" if passed_into is None else str(passed_into))
         small = addresses.substream
-        substream = None if small is None else await self._tried(small, "the substream: ")
+        async with self._turn():
+            source = await self._tried(addresses.source, site="" if passed_into is None else str(passed_into))
+            substream = None if small is None else await self._tried(small, "the substream: ")
         return TriedCamera(next(self._keys), name, source, substream)
 
     async def _tried(self, address: CameraAddress, which: str = "", site: str = "") -> TriedStream:
-        trial = await self._limited(try_stream, StreamRequest(address.with_password, address.options, site))
+        trial = await try_stream(StreamRequest(address.with_password, address.options, site))
         if trial.error:
             raise UserError(f"{which}{address.shown}: {trial.error}")
         self.sizes[address.source] = trial.width, trial.height
         _keep_latest(self.sizes, _MAX_STREAMS)
         return TriedStream(address, trial)
 
-    async def _limited(self, ask: Callable[[Request], Awaitable[Answer]], request: Request) -> Answer:
-        """Speak to a camera when few others are spoken to.
+    def trials_ahead(self, task: asyncio.Task[Any]) -> int:
+        """Return how many of the cameras that are spoken to must be done before a task begins; 0: it has."""
+        return max(0, self._queue.index(task) - _TRIALS_AT_ONCE + 1) if task in self._queue else 0
+
+    @contextlib.asynccontextmanager
+    async def _turn(self) -> AsyncIterator[None]:
+        """Wait until few others are spoken to.
 
         Raises:
             UserError: too many wait already.
         """
-        if self._waiting >= _MAX_WAITING:
+        if len(self._queue) >= _MAX_WAITING:
             raise UserError("too many cameras are being tried; wait for them")
-        self._waiting += 1
+        task = asyncio.current_task()
+        self._queue.append(task)
         try:
             async with self._trials:
-                return await ask(request)
+                yield
         finally:
-            self._waiting -= 1
+            self._queue.remove(task)
 
     def rename(self, key: int, name: str) -> None:
         """Rename a camera.

@@ -1,10 +1,11 @@
 /** The cameras in the configuration file: added after a trial, renamed, removed. A restart brings them into force. */
 
-import { requestOperator } from '../shared/requests.js';
-import { CAMERA_TIMEOUT_MS, CameraSearch } from '../shared/camera_search.js';
+import { requestOperator, requestTrial } from '../shared/requests.js';
+import { CameraSearch } from '../shared/camera_search.js';
 import { element, make, setText } from '../shared/dom.js';
 
 /** @import {CameraTrial} from '../shared/api_types.js' */
+/** @import {ShowWait} from '../shared/requests.js' */
 /** @import {SiteCamera} from './api_types.js' */
 /** @import {CameraTiles} from './camera_tiles.js' */
 /** @import {Section, ShowError} from './section.js' */
@@ -24,7 +25,7 @@ export class SiteCameras {
   constructor(showError, fileChanged) {
     this.showError = showError;
     this.fileChanged = fileChanged;
-    this.search = new CameraSearch(element('camera-search'), (trial) => this.#tryCamera(trial), showError);
+    this.search = new CameraSearch(element('camera-search'), (trial, showWait) => this.#tryCamera(trial, showWait), showError);
     this.#instead.addEventListener('change', () => (this.#name.disabled = this.#instead.value !== ''));
   }
 
@@ -38,12 +39,13 @@ export class SiteCameras {
 
   /**
    * @param {CameraTrial} trial
+   * @param {ShowWait} showWait
    * @returns {Promise<string>} what has become of it
    */
-  async #tryCamera(trial) {
+  async #tryCamera(trial, showWait) {
     const camera = this.#instead.value;
     const wanted = { ...trial, name: this.#name.value.trim() || trial.name, camera };
-    const { cameras, note } = await requestOperator('site_cameras', 'POST', wanted, CAMERA_TIMEOUT_MS);
+    const { cameras, note } = await requestTrial('site_cameras', wanted, showWait);
     this.#show(cameras);
     this.#name.value = this.#instead.value = '';
     this.#name.disabled = false;

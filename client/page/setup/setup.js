@@ -1,13 +1,14 @@
 /** Entry point of the set-up page: finds and tries cameras, names them, writes the configuration, and waits for the site. */
 
-import { CAMERA_TIMEOUT_MS, CameraSearch } from '../shared/camera_search.js';
+import { CameraSearch } from '../shared/camera_search.js';
 import { element, setText } from '../shared/dom.js';
-import { pause, requestOperator, untilAnswered } from '../shared/requests.js';
+import { pause, requestOperator, requestTrial, untilAnswered } from '../shared/requests.js';
 import { exchangeTokenInLink } from '../shared/sign_in.js';
 import { AddedCameras } from './added_cameras.js';
 import { SiteForm } from './site_form.js';
 
 /** @import {CameraTrial} from '../shared/api_types.js' */
+/** @import {ShowWait} from '../shared/requests.js' */
 /** @import {SetupState, WrittenSite} from './api_types.js' */
 
 const POLL_MS = 500;
@@ -32,10 +33,11 @@ function show(state) {
 
 /**
  * @param {CameraTrial} trial
+ * @param {ShowWait} showWait
  * @returns {Promise<string>} what has become of it
  */
-async function addCamera(trial) {
-  show(await requestOperator('setup/cameras', 'POST', trial, CAMERA_TIMEOUT_MS));
+async function addCamera(trial, showWait) {
+  show(await requestTrial('setup/cameras', trial, showWait));
   return 'was added';
 }
 

@@ -1,11 +1,12 @@
 /** Cameras found in the network, their streams, and addresses: what is chosen is tried. */
 
 import { element, make, setText } from './dom.js';
-import { HttpError, requestOperator } from './requests.js';
+import { HttpError, requestOperator, requestTrial } from './requests.js';
 
+/** @import {ShowWait} from './requests.js' */
 /** @import {CameraTrial, OfferedStream, OfferedStreams, SearchResult, SearchedCamera} from './api_types.js' */
 
-export const CAMERA_TIMEOUT_MS = 120_000; // a busy machine tries cameras one after the other
+const SEARCH_TIMEOUT_MS = 30_000;
 
 export class CameraSearch {
   #user = make('input', { id: 'camera-user', size: 14, maxLength: 200, autocomplete: 'off' });
@@ -19,7 +20,7 @@ export class CameraSearch {
 
   /**
    * @param {HTMLElement} place what is in it applies to every camera, and comes after the login
-   * @param {(trial: CameraTrial) => Promise<string>} tryCamera says what has become of a camera that sends pictures
+   * @param {(trial: CameraTrial, showWait: ShowWait) => Promise<string>} tryCamera says what has become of a camera that sends pictures
    * @param {(error: unknown) => void} showError of the sign-in
    */
   constructor(place, tryCamera, showError) {
@@ -59,7 +60,7 @@ export class CameraSearch {
     setText(this.#state, 'Searching…');
     try {
       /** @type {SearchResult} */
-      const { cameras, hint } = await requestOperator('setup/search', 'POST', undefined, CAMERA_TIMEOUT_MS);
+      const { cameras, hint } = await requestOperator('setup/search', 'POST', undefined, SEARCH_TIMEOUT_MS);
       this.#hint = hint;
       element('found').replaceChildren(...cameras.map((camera) => this.#foundItem(camera)));
       const count = cameras.length ? `${cameras.length} found.` : 'None found by ONVIF. Enter their addresses.';
@@ -112,7 +113,7 @@ export class CameraSearch {
     try {
       const { host, port } = camera;
       /** @type {OfferedStreams} */
-      const { error, streams, source, substream } = await requestOperator('setup/streams', 'POST', { host, port, ...this.#login }, CAMERA_TIMEOUT_MS);
+      const { error, streams, source, substream } = await requestTrial('setup/streams', { host, port, ...this.#login }, (wait) => setText(message, wait || 'Asking…'));
       setText(message, error ? `${host}: ${error}.` : '');
       const tracked = trackedChoice(camera, streams, substream);
       const first = streams.filter(({ key }) => key === source);
@@ -152,7 +153,8 @@ export class CameraSearch {
     const shown = label.replace(/\/\/[^/]*@/, '//'); // a login that was pasted with the address
     setText(this.#trial, `Trying ${shown}…`);
     try {
-      setText(this.#trial, `${shown} sends pictures and ${await this.tryCamera(trial)}.`);
+      const became = await this.tryCamera(trial, (wait) => setText(this.#trial, wait ? `${shown}: ${wait}` : `Trying ${shown}…`));
+      setText(this.#trial, `${shown} sends pictures and ${became}.`);
       return true;
     } catch (error) {
       this.#fail(this.#trial, error);

@@ -46,6 +46,28 @@ export function requestOperator(name, method = 'GET', content, timeoutMs = OPERA
   return requestJson(`api/operator/${name}`, method, content, timeoutMs);
 }
 
+/** @typedef {(wait: string) => void} ShowWait receives what a trial waits for; empty: it runs */
+
+/**
+ * Start a trial of a camera and wait for its result, which may come after those of others.
+ *
+ * @param {string} name below api/operator/
+ * @param {object} content the request's JSON
+ * @param {ShowWait} showWait
+ * @returns {Promise<any>}
+ * @throws {HttpError} with the server's error message
+ * @throws {Error} the server does not answer the first request
+ */
+export async function requestTrial(name, content, showWait) {
+  let answer = await requestOperator(name, 'POST', content);
+  while (answer.ahead !== undefined) {
+    const { trial, ahead } = answer;
+    showWait(ahead ? `waiting for ${ahead} ${ahead > 1 ? 'trials' : 'trial'} before…` : '');
+    answer = await untilAnswered(() => requestOperator(`setup/trials/${trial}`), () => showWait('the server does not answer; asking again…'));
+  }
+  return answer;
+}
+
 /**
  * Request an address whose errors are one line of text for the user.
  *

@@ -12,6 +12,7 @@ from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import SETUP
 from server.http.json_responses import error_response, json_response, read_json
 from server.http.operator.schema import OfferedStream, OfferedStreams, SearchedCamera, SearchResult
+from server.http.operator.trials import follow
 from server.setup.camera_address import CameraAddresses, parse_addresses
 from server.setup.onvif_profiles import INSTALL, is_installed
 from server.setup.session import SetupSession
@@ -82,11 +83,13 @@ async def post_search(request: web.Request) -> web.StreamResponse:
 
 
 @routes.post(f"{_PATH}/streams")
-@answers_user_errors
 async def post_streams(request: web.Request) -> web.StreamResponse:
     """Ask a found camera for its streams."""
-    query = await read_json(request, StreamsQuery)
-    answer, keys = await request.app[SETUP].profiles(query.host, query.port, query.user, query.password)
+    return await follow(request, _streams(request.app[SETUP], await read_json(request, StreamsQuery)))
+
+
+async def _streams(session: SetupSession, query: StreamsQuery) -> web.Response:
+    answer, keys = await session.profiles(query.host, query.port, query.user, query.password)
     streams = [
         OfferedStream(key, one.name, one.codec, one.width, one.height, one.fps)
         for key, one in zip(keys, answer.profiles, strict=True)

@@ -18,6 +18,7 @@ from server.http.operator import (
     settings,
     site_cameras,
     site_settings,
+    trials,
     walk,
     zones,
 )
@@ -62,6 +63,7 @@ routes = [
     *marked_points.routes,
     *restart.routes,
     *camera_search.routes,
+    *trials.routes,
     *site_cameras.routes,
     *site_settings.routes,
     *zones.routes,

@@ -262,6 +262,15 @@ class CorrectionStatus(msgspec.Struct, frozen=True):
     """Ids of the flags that these corrections follow."""
 
 
+class TrialProgress(msgspec.Struct, frozen=True):
+    """A trial that has no result yet."""
+
+    trial: int
+    """Its key, to ask again."""
+    ahead: int
+    """Trials that must end before it begins; 0: it runs."""
+
+
 OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/cameras": CameraDiagnosticsList,
     "/api/operator/pulses": PulseClients,
@@ -275,6 +284,7 @@ OPERATOR: dict[str, type[msgspec.Struct]] = {
     "/api/operator/restart": RestartStatus,
     "/api/operator/setup/search": SearchResult,
     "/api/operator/setup/streams": OfferedStreams,
+    "/api/operator/setup/trials/{key}": TrialProgress,
     "/api/operator/site_cameras": SiteCameras,
     "/api/operator/site_settings": SiteFormat,
     "/api/operator/view_selection": SelectionSettings,

@@ -9,6 +9,7 @@ from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import SETUP
 from server.http.json_responses import json_response, read_json
 from server.http.operator.camera_search import CameraTrial, Name, answers_user_errors
+from server.http.operator.trials import follow
 from server.setup.proposal import SiteProposal
 from server.setup.session import SetupSession
 
@@ -77,13 +78,9 @@ async def get_setup(request: web.Request) -> web.Response:
 
 
 @routes.post(f"{_PATH}/cameras")
-@answers_user_errors
 async def post_camera(request: web.Request) -> web.StreamResponse:
     """Try a camera, and add it if it sends pictures."""
-    session = request.app[SETUP]
-    trial = await read_json(request, CameraTrial)
-    await session.add(trial.addresses(session), trial.name)
-    return json_response(_state(session))
+    return await follow(request, _add(request.app[SETUP], await read_json(request, CameraTrial)))
 
 
 @routes.put(f"{_PATH}/cameras/{{key:[0-9]{{1,9}}}}")
@@ -122,6 +119,11 @@ async def post_site(request: web.Request) -> web.StreamResponse:
     session.write(choice.name, SiteProposal(choice.fps, choice.width, choice.height))
     kept = None if session.kept is None else str(session.kept)
     return json_response(WrittenSite(str(session.path), kept))
+
+
+async def _add(session: SetupSession, trial: CameraTrial) -> web.Response:
+    await session.add(trial.addresses(session), trial.name)
+    return json_response(_state(session))
 
 
 def _state(session: SetupSession) -> SetupState:

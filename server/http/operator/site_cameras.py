@@ -15,6 +15,7 @@ from server.http.json_responses import error_response, json_response, read_json
 from server.http.operator.camera_search import CameraTrial, Name
 from server.http.operator.config_file import change_config, config_path
 from server.http.operator.schema import SiteCamera, SiteCameras
+from server.http.operator.trials import follow
 from server.setup.site_cameras import (
     add_camera,
     demands_own_video,
@@ -59,18 +60,18 @@ async def get_site_cameras(request: web.Request) -> web.Response:
 @routes.post(_PATH)
 async def post_site_camera(request: web.Request) -> web.Response:
     """Try a camera; if it sends pictures, add it to the file, or give another one its address."""
-    wanted = await read_json(request, CameraToAdd)
+    return await follow(request, _try(request, await read_json(request, CameraToAdd)))
+
+
+async def _try(request: web.Request, wanted: CameraToAdd) -> web.Response:
     try:
         path = config_path(request)
         is_passed = await asyncio.to_thread(demands_own_video, path, wanted.camera)
     except UserError as error:
         return error_response(409, str(error))
-    try:
-        session = request.app[SETUP]
-        passed_into = path if is_passed else None
-        tried = await session.try_camera(wanted.addresses(session), wanted.name, passed_into)
-    except UserError as error:
-        return error_response(400, str(error))
+    session = request.app[SETUP]
+    passed_into = path if is_passed else None
+    tried = await session.try_camera(wanted.addresses(session), wanted.name, passed_into)
     if wanted.camera:
         sizes = _known_sizes(request)
         return await _answer(request, lambda path: readdress_camera(path, wanted.camera, tried, sizes))

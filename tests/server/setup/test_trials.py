@@ -232,6 +232,17 @@ async def test_only_found_cameras_get_a_password_and_only_few_are_tried_at_once(
     assert sum("too many" in str(problem) for problem in problems) == 3
 
 
+async def test_a_camera_that_is_tried_twice_at_a_time_is_added_once(tmp_path: Path) -> None:
+    session = SetupSession(tmp_path / "site.yaml")
+    with rtsp() as stream:
+        addresses = parse_addresses(stream.url, *LOGIN)
+        results = await asyncio.gather(*(session.add(addresses) for _ in range(2)), return_exceptions=True)
+    assert [str(result) for result in results if isinstance(result, UserError)] == [
+        f"{stream.url.replace('live', '...')}: this camera is in the list already"
+    ]
+    assert len(session.cameras) == 1
+
+
 @pytest.mark.parametrize(
     ("address", "local"),
     [

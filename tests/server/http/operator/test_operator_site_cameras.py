@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
+import socket
 from collections.abc import AsyncIterator, Iterator
 from contextlib import aclosing
 from pathlib import Path
@@ -62,8 +64,14 @@ async def site(path: Path) -> AsyncIterator[ServedSite]:
 async def send(
     site: ServedSite, method: str, body: Any, headers: dict[str, str] = CHANGES, path: str = PATH
 ) -> tuple[int, dict[str, Any]]:
+    """Send a request, and follow the trial that it may have begun."""
     async with site.session.request(method, path, json=body, headers=headers) as answer:
-        return answer.status, json.loads(await answer.text())
+        status, content = answer.status, json.loads(await answer.text())
+    while status == 202:
+        place = f"/api/operator/setup/trials/{content['trial']}"
+        async with site.session.get(place, headers=headers) as answer:
+            status, content = answer.status, json.loads(await answer.text())
+    return status, content
 
 
 async def test_a_camera_is_tried_added_renamed_and_removed(site: ServedSite, stream: RtspCamera) -> None:
@@ -109,6 +117,30 @@ async def test_what_is_in_pixels_follows_the_pictures_that_were_tried(
         larger.close()
     assert second["note"] == "scaled from 64x48 to 128x96: its zone till"
     assert load_config(path).zones[0].area == [(0, 0), (80, 0), (80, 60)]
+
+
+async def test_a_trial_that_waits_for_others_says_for_how_many(site: ServedSite, path: Path) -> None:
+    """Cameras that accept a connection and then say nothing are tried for many seconds."""
+
+    async def ask(place: str, body: Any = None) -> tuple[int, dict[str, Any]]:
+        method = "GET" if body is None else "POST"
+        async with site.session.request(method, place, json=body, headers=CHANGES) as answer:
+            return answer.status, json.loads(await answer.text())
+
+    silent = [socket.create_server(("127.0.0.1", 0)) for _ in range(3)]
+    bodies = [{"address": f"rtsp://127.0.0.1:{each.getsockname()[1]}/"} for each in silent]
+    answers = await asyncio.gather(*(ask(PATH, body) for body in bodies))
+    assert [(status, answer["ahead"]) for status, answer in answers] == [(202, 0), (202, 0), (202, 1)]
+    for each in silent:
+        each.close()
+    for _, answer in answers:
+        status = 202
+        while status == 202:
+            status, result = await ask(f"/api/operator/setup/trials/{answer['trial']}")
+        assert status == 400
+        assert result["error"].startswith("rtsp://127.0.0.1:")
+    assert (await ask("/api/operator/setup/trials/99"))[0] == 404
+    assert path.read_text() == TEXT
 
 
 @pytest.mark.parametrize(
