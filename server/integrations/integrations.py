@@ -17,10 +17,7 @@ log = logging.getLogger(__name__)
 
 
 class Integrations:
-    """The webhooks and the MQTT connection of a service.
-
-    Of several with the same people the first has the webhooks; the first of all has MQTT.
-    """
+    """The webhooks and the MQTT connection of a service; of several of the same people the first has them."""
 
     def __init__(self, service: BestViewService) -> None:
         self._service = service
@@ -41,7 +38,7 @@ class Integrations:
         self._settings = settings
         url = config.http.public_url
         found: list[MqttPublisher | Webhook] = [Webhook(webhook, url) for webhook in config.webhooks]
-        if config.mqtt.host is not None and not config.view.share.index:
+        if config.mqtt.host is not None:
             found.append(MqttPublisher(config.mqtt, self._reader, url))
         self._running = [(each, asyncio.create_task(each.run(), name=type(each).__name__)) for each in found]
         for _, task in self._running:

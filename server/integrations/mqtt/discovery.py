@@ -23,11 +23,14 @@ Components = dict[str, dict[str, Any]]
 def discovery_messages(
     state: SiteState, topics: Topics, prefix: str, *, url: str | None = None, may_operate: bool = False
 ) -> dict[str, dict[str, Any]]:
-    """Return the discovery messages of a site, by topic.
+    """Return the discovery messages of a site, or of one of its areas, by topic.
 
     ``url`` is the page's address, for links; ``may_operate``: recording is a switch, not a sensor.
     """
     site_id = f"myview_{state.site}"
+    own_id, own_name = site_id, state.site
+    if topics.area is not None:
+        own_id, own_name = f"{site_id}_area_{topics.area}", f"{state.site} area {topics.area}"
 
     def device(key: str, name: str, model: str, components: Components) -> tuple[str, dict[str, Any]]:
         about: dict[str, Any] = {
@@ -37,8 +40,8 @@ def discovery_messages(
             "model": model,
             "sw_version": version("myview"),
         }
-        if key != site_id:
-            about["via_device"] = site_id
+        if key != own_id:
+            about["via_device"] = own_id
         if url is not None:
             about["configuration_url"] = url
         for component, settings in components.items():
@@ -50,19 +53,32 @@ def discovery_messages(
             "qos": 1,
             "components": components,
         }
-        return f"{prefix}/device/{key}/config", message
+        return _device_topic(prefix, key), message
 
-    messages = dict([device(site_id, state.site, "Site", _site(state, topics, may_operate=may_operate))])
+    model = "Site" if topics.area is None else "Area"
+    messages = dict([device(own_id, own_name, model, _site(state, topics, may_operate=may_operate))])
     for camera in state.cameras:
         key, name = f"{site_id}_camera_{camera.camera}", f"{state.site} {camera.camera}"
         topic, message = device(key, name, "Camera", _camera(topics.camera(camera.camera)))
         messages[topic] = message
     for person in state.persons:
-        topic, message = device(
-            f"{site_id}_person_{person.key}", person.name, "Person", _person(person, topics, state)
-        )
+        key = _person_id(topics, person.key)
+        topic, message = device(key, person.name, "Person", _person(person, topics, state))
         messages[topic] = message
     return messages
+
+
+def person_discovery(topics: Topics, key: str, prefix: str) -> str:
+    """Return the topic of a named person's discovery message."""
+    return _device_topic(prefix, _person_id(topics, key))
+
+
+def _person_id(topics: Topics, key: str) -> str:
+    return f"myview_{topics.site}_person_{key}"
+
+
+def _device_topic(prefix: str, key: str) -> str:
+    return f"{prefix}/device/{key}/config"
 
 
 def _sensor(name: str, topic: str, key: str, **settings: Any) -> dict[str, Any]:

@@ -17,9 +17,9 @@ import msgspec
 from expbackoff import Backoff
 from logthrottle import LogThrottle
 from server.config.sections import MqttSettings
-from server.integrations.mqtt.discovery import discovery_messages, without_removed
+from server.integrations.mqtt.discovery import discovery_messages, person_discovery, without_removed
 from server.integrations.mqtt.site_reader import SiteReader
-from server.integrations.mqtt.site_state import PersonState, Topics, state_messages
+from server.integrations.mqtt.site_state import PersonState, Topics, person_content, state_messages
 from server.integrations.secret_files import read_secret
 from server.service.facade.rules import PicturedEvent, event_without
 from server.system.errors import UserError, reason_of
@@ -42,13 +42,14 @@ class MqttPublisher:
 
     def __init__(self, settings: MqttSettings, reader: SiteReader, url: str | None) -> None:
         self._settings, self._reader, self._url = settings, reader, url
-        self._topics = Topics(settings.topic, reader.site)
+        self._topics = Topics(settings.topic, reader.site, reader.area)
         self._events: deque[PicturedEvent] = deque(maxlen=_EVENTS_MAX)
         self._has_events = asyncio.Event()
         self._published: dict[str, bytes] = {}
         """Retained messages as the broker has them, by topic."""
         self._devices: dict[str, dict[str, Any]] = {}
         """Discovery messages likewise."""
+        self._absent = msgspec.json.encode(person_content(PersonState(""), self._topics))
         self._stale: set[str] = set()
         """States of people of an earlier run who are not known now, by topic."""
         self._failures = LogThrottle()
@@ -93,7 +94,7 @@ class MqttPublisher:
             settings.port,
             username=settings.username,
             password=password,
-            identifier=f"myview-{self._reader.site}",
+            identifier=f"myview-{topics.site}" + ("" if topics.area is None else f"-area-{topics.area}"),
             will=aiomqtt.Will(topics.status, b"offline", _QOS, retain=True),
             tls_context=_tls_context(settings) if settings.tls else None,
             timeout=_TIMEOUT_S,
@@ -135,12 +136,25 @@ class MqttPublisher:
                 if payload == b"online":  # Home Assistant has started: tell it all again
                     self._published.clear()
                     self._devices.clear()
-            elif message.retain and payload:
-                self._stale.add(topic)
+            elif isinstance(payload, bytes) and payload:
+                self._hear_of_person(topic, payload, is_retained=message.retain)
+
+    def _hear_of_person(self, topic: str, payload: bytes, *, is_retained: bool) -> None:
+        """Keep what an earlier run has told; tell again what another area has told about who is here."""
+        is_own = _area_of(payload) in {None, self._topics.area}
+        if is_retained and is_own:
+            self._stale.add(topic)
+        elif not is_own and self._published.get(topic, self._absent) != self._absent:
+            del self._published[topic]
 
     async def _publish_states(self, client: aiomqtt.Client) -> None:
         while not self._is_ending:
             state = self._reader.read()
+            for key in state.elsewhere:  # their area tells now
+                self._published.pop(self._topics.person(key), None)
+                self._stale.discard(self._topics.person(key))
+                if self._settings.discovery is not None:
+                    self._devices.pop(person_discovery(self._topics, key, self._settings.discovery), None)
             if self._settings.discovery is not None:
                 messages = discovery_messages(
                     state,
@@ -151,9 +165,8 @@ class MqttPublisher:
                 )
                 await self._publish_devices(client, messages)
             wanted = state_messages(state, self._topics)
-            absent = msgspec.json.encode({"presence": "OFF", "zone": None, "camera": None, "object": None})
             for topic in self._stale - wanted.keys():
-                wanted[topic] = absent
+                wanted[topic] = self._absent
             await self._publish_changed(client, wanted)
             await asyncio.sleep(_EVERY_S)
 
@@ -222,6 +235,20 @@ class MqttPublisher:
             name: f"{base}/{value}" if name in {"picture", "clip"} and value else value
             for name, value in content.items()
         }
+
+
+class _AboutPerson(msgspec.Struct):
+    """As far as it is read of a message about a named person."""
+
+    area: int | None = None
+
+
+def _area_of(payload: bytes) -> int | None:
+    """Return the area that has sent a message about a named person; None: none says so."""
+    try:
+        return msgspec.json.decode(payload, type=_AboutPerson).area
+    except msgspec.MsgspecError:
+        return None
 
 
 def _tls_context(settings: MqttSettings) -> ssl.SSLContext:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from server.integrations.mqtt.site_state import CameraState, PersonState, RuleState, SiteState
+from server.integrations.mqtt.site_state import CameraState, PersonState, RuleState, SiteState, person_key
 from server.service.facade.people import PersonSummary
 from server.service.facade.rendering import PersonView, PictureTimeoutError, RenderPoolFullError
 from server.service.service import BestViewService
@@ -23,18 +23,29 @@ class SiteReader:
         """The site's name."""
         return self._service.config.site.name
 
+    @property
+    def area(self) -> int | None:
+        """The service's area; None: it has the whole site."""
+        share = self._service.config.view.share
+        return share.share if share.areas else None
+
     def read(self) -> SiteState:
         """Return the state now."""
         service = self._service
         people, rules = service.people.list_people(), service.rules.rules()
+        people = [person for person in people if service.people.is_reported(person.number)]
+        elsewhere = self._names_elsewhere(people)
         recording = service.recordings.status
+        keepers = service.config.view.share.keepers
         return SiteState(
             site=self.site,
             people=sum(self._is_present(person) for person in people),
-            persons=self._persons(people),
+            persons=self._persons(people, elsewhere),
+            elsewhere={person_key(name) for name in elsewhere},
             cameras=[
                 CameraState(camera.camera, camera.state, camera.condition, camera.covered_share)
                 for camera in service.cameras.list_cameras()
+                if keepers is None or camera.camera in keepers
             ],
             zones={zone.zone: len(zone.objects) for zone in rules.zones if zone.area is not None},
             rules=[RuleState(rule.rule, rule.kind, rule.lasting) for rule in rules.rules],
@@ -59,21 +70,27 @@ class SiteReader:
         except (KeyError, RenderPoolFullError, PictureTimeoutError):
             return None
 
-    def _persons(self, people: list[PersonSummary]) -> list[PersonState]:
+    def _names_elsewhere(self, people: list[PersonSummary]) -> set[str]:
+        """Return the names of people about whom another area tells, and nobody here."""
+        names = self._service.people.manual_overrides().names
+        elsewhere = {name for number, name in names.items() if not self._service.people.is_reported(number)}
+        return elsewhere.difference(person.name for person in people if person.name)
+
+    def _persons(self, people: list[PersonSummary], elsewhere: set[str]) -> list[PersonState]:
         """Return all named people; of several with one name the present one, or the one seen last."""
         now: dict[str, PersonSummary] = {}
         for person in people:
             before = now.get(person.name or "")
             if person.name and (before is None or before.last_seen < person.last_seen):
                 now[person.name] = person
-        current_names = self._service.people.manual_overrides().names.values()
+        current_names = set(self._service.people.manual_overrides().names.values())
         for name, person in now.items():
             is_present = self._is_present(person)
             zones = tuple(self._service.rules.zones_of(person.number)) if is_present else ()
             self._named[name] = PersonState(name, person.number, is_present, person.camera, zones)
         for name in list(self._named):
             if name not in now:
-                if name in current_names:
+                if name in current_names - elsewhere:
                     self._named[name] = PersonState(name)
                 else:  # renamed, or forgotten
                     del self._named[name]

@@ -1,10 +1,14 @@
-"""The state of a site as MQTT tells it, and its topics."""
+"""The state of a site as MQTT tells it, and its topics.
+
+Where services divide a site by area, each tells its own: with its own status, so that each has a last will,
+and its own cameras, which are in one area each. A named person has the same topics in all areas.
+"""
 
 from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import msgspec
@@ -69,7 +73,14 @@ class RuleState:
 
 @dataclass(frozen=True, slots=True)
 class SiteState:
-    """All that is published of a site; ``zones``: numbers of people; ``recording`` None: there is none."""
+    """All that is published of a site, or of one of its areas.
+
+    Attributes:
+        people: how many are there.
+        zones: numbers of people.
+        recording: None: there is none.
+        elsewhere: keys of named people about whom another area tells.
+    """
 
     site: str
     people: int
@@ -78,6 +89,7 @@ class SiteState:
     zones: Mapping[str, int]
     rules: Sequence[RuleState]
     recording: bool | None
+    elsewhere: Collection[str] = ()
 
 
 def person_key(name: str) -> str:
@@ -88,10 +100,11 @@ def person_key(name: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Topics:
-    """The topics of a site below ``prefix``."""
+    """The topics of a site, or of one of its areas, below ``prefix``."""
 
     prefix: str
     site: str
+    area: int | None = None
 
     @property
     def base(self) -> str:
@@ -99,14 +112,19 @@ class Topics:
         return f"{self.prefix}/{self.site}"
 
     @property
+    def own(self) -> str:
+        """The beginning of those that each area has for itself."""
+        return self.base if self.area is None else f"{self.base}/areas/{self.area}"
+
+    @property
     def status(self) -> str:
         """``online``, or by the last will ``offline``; retained."""
-        return f"{self.base}/status"
+        return f"{self.own}/status"
 
     @property
     def state(self) -> str:
-        """The site's state, JSON, retained."""
-        return f"{self.base}/state"
+        """The state of the site or area, JSON, retained."""
+        return f"{self.own}/state"
 
     @property
     def events(self) -> str:
@@ -116,7 +134,7 @@ class Topics:
     @property
     def recording_command(self) -> str:
         """The command ``ON`` or ``OFF``."""
-        return f"{self.base}/recording/set"
+        return f"{self.own}/recording/set"
 
     def camera(self, camera: str) -> str:
         """A camera's state, JSON, retained."""
@@ -132,15 +150,15 @@ class Topics:
 
     def rule(self, rule: str) -> str:
         """``ON`` or ``OFF`` of what lasts, retained."""
-        return f"{self.base}/rules/{rule}/state"
+        return f"{self.own}/rules/{rule}/state"
 
     def rule_event(self, rule: str) -> str:
         """A rule's events as Home Assistant's event entities read them, JSON."""
-        return f"{self.base}/rules/{rule}/event"
+        return f"{self.own}/rules/{rule}/event"
 
     def rule_picture(self, rule: str) -> str:
         """The small picture of a rule's newest event, JPEG."""
-        return f"{self.base}/rules/{rule}/picture"
+        return f"{self.own}/rules/{rule}/picture"
 
 
 def state_messages(state: SiteState, topics: Topics) -> dict[str, bytes]:
@@ -156,17 +174,23 @@ def state_messages(state: SiteState, topics: Topics) -> dict[str, bytes]:
             "problem": on_or_off(is_on=camera.has_problem),
         }
     for person in state.persons:
-        messages[topics.person(person.key)] = {
-            "presence": on_or_off(is_on=person.is_present),
-            "zone": ", ".join(person.zones) or None,
-            "camera": person.camera,
-            "object": person.number,
-        }
+        messages[topics.person(person.key)] = person_content(person, topics)
     encoded = {topic: msgspec.json.encode(message) for topic, message in messages.items()}
     for rule in state.rules:
         if not rule.is_momentary:
             encoded[topics.rule(rule.rule)] = on_or_off(is_on=rule.is_lasting).encode()
     return encoded
+
+
+def person_content(person: PersonState, topics: Topics) -> dict[str, object]:
+    """Return what is told about a named person."""
+    content: dict[str, object] = {
+        "presence": on_or_off(is_on=person.is_present),
+        "zone": ", ".join(person.zones) or None,
+        "camera": person.camera,
+        "object": person.number,
+    }
+    return content if topics.area is None else {**content, "area": topics.area}
 
 
 def on_or_off(*, is_on: bool) -> str:

@@ -159,6 +159,10 @@ class PeopleService:
         index = self._pipeline.decider.people.of_service.share_of(number)
         return Shard(index, index == share.share, share_address(index, share), bool(share.areas))
 
+    def is_reported(self, number: int) -> bool:
+        """Return whether this service tells other systems about a person; of several areas the first does."""
+        return self._pipeline.decider.people.of_service.is_reported(number)
+
     def current_number(self, number: int) -> int:
         """Return the current number of a merged one, as far as decisions have been published."""
         return self._pipeline.decision_state.resolve(number)

@@ -54,6 +54,10 @@ class PeopleOfService(Protocol):
         """Return the share that a number belongs to, as far as is known."""
         ...
 
+    def is_reported(self, number: int) -> bool:
+        """Return whether this service tells other systems about a person: of several that know them, one."""
+        ...
+
     def update(self, seen: Iterable[TracksOfPeople], frame: int) -> None:
         """Take in where people are seen in an epoch that ends with a frame."""
         ...
@@ -92,6 +96,10 @@ class PeopleByNumber:
     def share_of(self, number: int) -> int:
         """Return the share of a number, whether or not it is in use."""
         return number % self._share.of
+
+    def is_reported(self, number: int) -> bool:  # noqa: ARG002
+        """Return true: only the first service reports."""
+        return True
 
     def update(self, seen: Iterable[TracksOfPeople], frame: int) -> None:
         """Ignore where people are."""
@@ -139,6 +147,11 @@ class PeopleOfArea:
         if number in self._seen or number not in self._elsewhere:
             return self._share.share
         return self._elsewhere[number].area
+
+    def is_reported(self, number: int) -> bool:
+        """Return whether nobody else has a person, or of both areas this is the first."""
+        other = self._elsewhere.get(number)
+        return other is None or (number in self._seen and self._share.share < other.area)
 
     def update(self, seen: Iterable[TracksOfPeople], frame: int) -> None:
         """Take over who is in the area, and release who is in another one."""

@@ -81,10 +81,20 @@ class AreaAgreement:
         """Keep a record of another area until this service is at its pulse."""
         if self.is_other(record):
             self.learn_numbers(record)
+            self._learn_names(record)
             waiting = self._waiting.setdefault(record.service, {})
             waiting[record.pulse] = record
             for pulse in sorted(waiting)[:-_WAITING_MAX]:
                 del waiting[pulse]
+
+    def _learn_names(self, record: ServiceRecord) -> None:
+        """Take over the names of people in another area who are known here."""
+        registry = self._people.registry
+        for snapshot in record.cameras.values():
+            for person in snapshot.people:
+                is_known = person.number in registry.first_seen and person.number not in registry.names
+                if person.name and is_known and person.number in record.in_area:
+                    registry.set_name(person.number, person.name)
 
     def step(self, own: Mapping[int, ServiceRecord], live: Iterable[ServiceRecord]) -> int:
         """Take in who is in the other areas, and take over their numbers where two records in a row say so.

@@ -13,7 +13,7 @@ from server.service.facade.rules import EventRecord, PicturedEvent
 
 
 class Reader:
-    site = "hall"
+    site, area = "hall", None
 
 
 async def test_a_person_deleted_while_an_event_is_published_is_in_no_further_message() -> None:

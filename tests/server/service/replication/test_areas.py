@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import msgspec
 import pytest
 
 from benchmarks.scaling.divided_hall import DividedRun, Observed, agreement, divide, observe, run_divided
@@ -93,6 +94,18 @@ class TestAgreement:
             agreement.receive(there)
             assert agreement.step({pulse: self.record(0, pulse, {2: 2}, {1: 3})}, [there]) == 0
         assert {1, 2} <= people.registry.first_seen.keys()
+
+    def test_the_names_of_people_in_another_area_are_taken_over(self, service: FedService) -> None:
+        people = service.decider.people
+        agreement = AreaAgreement(service.config.view.share, people)
+        there = self.record(1, 20, {1: 1, 2: 2, 3: 77}, {1: 0, 77: 0})
+        named = [
+            msgspec.structs.replace(person, name=f"Ann {person.number}")
+            for person in there.cameras["c1"].people
+        ]
+        snapshot = msgspec.structs.replace(there.cameras["c1"], people=named)
+        agreement.receive(msgspec.structs.replace(there, cameras={"c1": snapshot}))
+        assert people.registry.names == {1: "Ann 1"}, "2 is not there, 77 is not known here"
 
     def test_numbers_that_another_service_remembers_are_not_assigned_again(
         self, service: FedService, monkeypatch: pytest.MonkeyPatch
