@@ -140,13 +140,9 @@ class BestViewPipeline:
             UserError: its address is in use, or a password file cannot be read.
         """
         self.pulses.load_credentials()
-        handlers = {
-            **self.ingest.handlers,
-            "tracks": self._tracks,
-            "retained_identities": self._retained_identities,
-        }
+        own = {"tracks": self._tracks, "retained_identities": self._retained_identities}
         on_audio = None if self.audio_buffer is None else self.ingest.audio
-        self.bus.open(handlers, on_audio, self._alive)
+        self.bus.open({**self.ingest.handlers, **own}, on_audio, self._alive)
 
     async def run(self) -> None:
         """Serve until every camera's recording has ended.
@@ -200,7 +196,10 @@ class BestViewPipeline:
     def decide(self) -> None:
         """Decide and publish all epochs that are ready, where no cameras are tracked jointly."""
         while (epoch := self._next_epoch()) is not None:
-            self._step(epoch)
+            self.state_replication.begin(epoch.last)
+            with self.stage_timers.deciding():
+                decisions = self.decider.step(epoch)
+            self._finish_epoch(epoch, decisions)
 
     async def decide_or_skip(self) -> None:
         """Decide and publish the epochs that are ready, or skip those that would be decided too late.
@@ -212,7 +211,11 @@ class BestViewPipeline:
             if self.config.joint_cameras:
                 with self.stage_timers.tracking():
                     epoch = await self.joint.step(epoch)
-            self._step(epoch)
+            self.state_replication.begin(epoch.last)
+            with self.stage_timers.deciding():
+                await self.decider.people.associate(epoch)
+                decisions = self.decider.step(epoch)
+            self._finish_epoch(epoch, decisions)
             await asyncio.sleep(0)
             for _ in range(_INBOX_TURNS):
                 if not self.bus.has_waiting_messages:
@@ -295,13 +298,10 @@ class BestViewPipeline:
         self.ingest.retained_identities(message, self.state_replication.snapshot_received)
         self._changed.set()
 
-    def _step(self, epoch: Epoch) -> None:
+    def _finish_epoch(self, epoch: Epoch, decisions: Sequence[GopDecision]) -> None:
         self._last_decided = epoch.last
         self.loss_recorder.record_epoch(epoch)
         self.walk_session.add(epoch)
-        self.state_replication.begin(epoch.last)
-        with self.stage_timers.deciding():
-            decisions = self.decider.step(epoch)
         self.state_replication.advance(epoch.last)  # before publishing, so that names are restored
         self.replication.step(epoch)
         self.other_sites.step()

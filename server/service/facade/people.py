@@ -207,7 +207,7 @@ class PeopleService:
     def manual_overrides(self) -> PersonOverrides:
         """Return the operator's names and merges."""
         people = self._pipeline.decider.people
-        return PersonOverrides(dict(sorted(people.registry.names.items())), people.manual_merges)
+        return PersonOverrides(dict(sorted(people.registry.names.items())), people.overrides.merged)
 
     def check_editable(self, number: int) -> None:
         """Check that a person can be edited.

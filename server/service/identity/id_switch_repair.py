@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 
 from bestview import IdentityRegistry, Split, TrackKey
 from server.service.identity.camera_window import CameraWindow, WindowReader
-from server.service.identity.track_parts import UNCONFIRMED, UNKNOWN, TrackPart, person_numbers
+from server.service.identity.track_parts import UNCONFIRMED, UNKNOWN, Parts, TrackPart, person_numbers
 from server.service.ingest.window_history import HistorySpan
-
-Parts = dict[TrackKey, Sequence[TrackPart]]
 
 
 class IdSwitchRepair:

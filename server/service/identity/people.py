@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bestview import SINGLE_SITE, IdentityRegistry, IdentitySettings, IdSeries, Merge, Split, TrackKey
-from server.config.sections import ShareSettings
 from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
+from server.service.identity.association import AssociationThread, Run, RunningAssociation, run_here
 from server.service.identity.camera_window import CameraWindow, WindowReader
 from server.service.identity.common_ground import CommonGround
 from server.service.identity.expected_tracks import ExpectedTracks
@@ -20,22 +21,22 @@ from server.service.identity.manual_overrides import ManualOverrides, numbers_of
 from server.service.identity.numbered_boxes import numbered_boxes
 from server.service.identity.person_registry import PersonRegistry
 from server.service.identity.published_tracks import PublishedTracks
-from server.service.identity.sharding import PeopleByNumber, PeopleOfService, TracksOfPeople
+from server.service.identity.sharding import ALL_PEOPLE, PeopleOfService, TracksOfPeople
 from server.service.identity.track_parts import (
     UNCONFIRMED,
     UNKNOWN,
+    Parts,
     TrackPart,
-    merge_settled_parts,
     person_numbers,
-    track_parts,
+    replace_numbers,
+    unconfirm,
+    update_parts,
 )
 from server.service.identity.undetected_frames import UndetectedFrames
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.ingest.window_history import HistorySpan, WindowHistory
 from tracking.frame_rate import frames_in
 
-ALL = PeopleByNumber(ShareSettings())
-"""A single service has all people."""
 _COMPARED_S = 1.0
 """Seconds of each camera's final tracks that are kept, to find the identity switches of its next revision."""
 _RECENT_S = 4.0
@@ -59,7 +60,7 @@ class PersonTracker:
         homographies: Mapping[str, NDArray[np.float64] | None],
         site_size: tuple[int, int],
         lag: int,
-        of_service: PeopleOfService = ALL,
+        of_service: PeopleOfService = ALL_PEOPLE,
         overhead: Collection[str] = (),
         fps: float = 25.0,
         joint_cameras: Sequence[str] = (),
@@ -83,18 +84,34 @@ class PersonTracker:
         """Frames without detection, by camera."""
         self.published = PublishedTracks()
         """The tracks behind the boxes of published GOPs."""
-        self._parts: dict[TrackKey, Sequence[TrackPart]] = {}
+        self._parts: Parts = {}
         self._last_reported: dict[TrackKey, int] = {}
         self._needed_from = 0
         """The first frame that is still needed."""
         self._corrections: list[Merge | Split] = []
-        self._overrides = ManualOverrides()
+        self.overrides = ManualOverrides()
         self.expected = ExpectedTracks()
-        self._newest = -1
-        """The last frame of the newest epoch."""
+        self.newest = -1
+        """The last frame of the newest epoch; -1: none."""
+        self._thread = AssociationThread()
+        self._running: RunningAssociation | None = None
 
     def update(self, epoch: Epoch) -> Sequence[CameraWindow]:
-        """Associate an epoch's tracks; return its windows, late revisions first."""
+        """Associate an epoch's tracks, unless that was done; return its windows, late revisions first."""
+        if self.newest != epoch.last:
+            self._begin(epoch, run_here)
+        self._finish()
+        return self._windows
+
+    async def associate(self, epoch: Epoch) -> None:
+        """Associate an epoch's tracks in a thread; `update` returns the result.
+
+        Whatever changes or asks for identities meanwhile waits for it.
+        """
+        await self._begin(epoch, self._thread.run).wait()
+
+    def _begin(self, epoch: Epoch, run: Run) -> RunningAssociation:
+        """Take an epoch's windows, and begin to associate their tracks."""
         late = [self._store(window) for window in self._reader.read_late(epoch)]
         windows = [self._store(window) for window in self._reader.read(epoch)]
         own = [window for window in windows if not epoch.is_joint(window.message.camera)]
@@ -103,20 +120,28 @@ class PersonTracker:
         tracks = [track for window in own for track in window.fresh_tracks()]
         if epoch.joint is not None:
             tracks += self._ground.updates(epoch.joint.tracks, [window.message for window in joint])
-        since = max(self._newest + 1, epoch.last + 1 - self._recent)  # epochs may have been skipped
+        since = max(self.newest + 1, epoch.last + 1 - self._recent)  # epochs may have been skipped
         image_sizes = self.undetected.detecting_cameras(windows, since - self._lag, epoch.last - self._lag)
-        self._newest = epoch.last
-        update = self._overrides.apply(self._registry.update(tracks, epoch.last - self._lag, image_sizes))
-        for key, parts in track_parts(update.person_ids).items():
-            self._parts[key] = merge_settled_parts(self._parts.get(key, ()), parts, self._needed_from)
+        self.newest = epoch.last
+        association = partial(self._registry.update, tracks, epoch.last - self._lag, image_sizes)
+        self._windows = [*late, *windows]
+        self._running = RunningAssociation(windows, run(association))
+        return self._running
+
+    def _finish(self) -> None:
+        """Wait for the end of a running association, and take its result."""
+        if self._running is None:
+            return
+        running, self._running = self._running, None
+        update = self.overrides.apply(running.numbers.result())
+        update_parts(self._parts, update.person_ids, self._needed_from)
         self._id_switch_repair.overlay(self._parts)
-        self._record_visible(windows, epoch.last)
+        self._record_visible(running.windows, self.newest)
         self.registry.update_presence(update.departed, update.returned)
         for merge in update.merged:
             self._merge(merge.kept, merge.lost)
         self._corrections += [*update.merged, *update.split]
-        self._forget(epoch.last)
-        return [*late, *windows]
+        self._forget(self.newest)
 
     @property
     def letterboxes(self) -> Mapping[str, Letterbox]:
@@ -133,29 +158,20 @@ class PersonTracker:
         """The numbers of the other shards' people, in order."""
         return self.of_service.others(self.registry.all_numbers, self.registry.merged)
 
-    @property
-    def next_number(self) -> int:
-        """The first unused number."""
-        return self._registry.next_id
-
     def reserve_numbers_below(self, number: int) -> None:
         """Assign no number below this one: an earlier run has used them."""
-        self._registry.reserve_below(number)
+        self.identity.reserve_below(number)
 
     def expect(self, tracks: Mapping[TrackName, int], last_pulse: int) -> None:
         """Expect tracks that belonged to these people in an earlier run, which ended with `last_pulse`."""
         new = {track: number for track, number in tracks.items() if not self.is_known(track)}
         self.expected.add(new, last_pulse)
 
-    @property
-    def manual_merges(self) -> dict[int, int]:
-        """Return the manual merges: by merged number, the number that was kept."""
-        return self._overrides.merged
-
     def merge(self, kept: int, lost: int) -> None:
         """Merge two people on the operator's command, permanently and regardless of the evidence."""
+        self._finish()
         is_present = not {kept, lost} <= self.registry.departed
-        self._overrides.merge(kept, lost, self.registry.departed)
+        self.overrides.merge(kept, lost, self.registry.departed)
         self._merge(kept, lost)
         if is_present:
             self.registry.departed.discard(kept)
@@ -164,27 +180,26 @@ class PersonTracker:
     def split_off(self, number: int, cameras: Collection[str]) -> int | None:
         """Split the tracks of these cameras off a person as a new person, on the operator's command.
 
-        Returns:
-            The new number; None: none of the cameras shows the person now.
+        Returns the new number; None: none of the cameras shows the person now.
         """
+        self._finish()
         shown_by = self._ground.seen_as(cameras)
         tracks = [
             key
             for key, parts in self._parts.items()
             if key.camera in shown_by
             and parts[-1].number == number
-            and self._last_reported.get(key) == self._newest
+            and self._last_reported.get(key) == self.newest
         ]
-        new = self._registry.split_off(tracks, self._overrides.automatic_numbers(number))
+        new = self.identity.split_off(tracks, self.overrides.automatic_numbers(number))
         if new is None:
             return None
         for key in tracks:  # the registry does not report settled tracks again
             since = max(self._needed_from, self._parts[key][-1].first)
             self._parts[key] = [*self._parts[key], TrackPart(since, new)]
-            self.registry.record_visible([TrackPart(since, new)], since, max(since, self._newest))
-        self._corrections += [
-            Split(number, new, camera) for camera in sorted({track.camera for track in tracks})
-        ]
+            self.registry.record_visible([TrackPart(since, new)], since, max(since, self.newest))
+        from_cameras = sorted({track.camera for track in tracks})
+        self._corrections += [Split(number, new, camera) for camera in from_cameras]
         return new
 
     def forget(self, numbers: Collection[int]) -> set[TrackName]:
@@ -192,17 +207,10 @@ class PersonTracker:
 
         Who is visible is confirmed anew under another number, by tracks without a past.
         """
-        self._registry.forget(
-            {raw for number in numbers for raw in self._overrides.automatic_numbers(number)}
-        )
-        shown: set[TrackName] = set()
-        for key, parts in self._parts.items():
-            if any(part.number in numbers for part in parts):
-                shown.update(self._ground.own_tracks(key))
-                self._parts[key] = [
-                    TrackPart(part.first, UNCONFIRMED) if part.number in numbers else part for part in parts
-                ]
-        self._overrides.forget(numbers)
+        self.identity.forget({raw for number in numbers for raw in self.overrides.automatic_numbers(number)})
+        unconfirmed = unconfirm(self._parts, numbers)
+        shown = {track for key in unconfirmed for track in self._ground.own_tracks(key)}
+        self.overrides.forget(numbers)
         self._id_switch_repair.forget(numbers)
         self.published.forget(numbers)
         self.registry.forget(numbers)
@@ -213,13 +221,9 @@ class PersonTracker:
         return shown
 
     @property
-    def newest(self) -> int:
-        """The last frame of the newest epoch; -1: none."""
-        return self._newest
-
-    @property
     def identity(self) -> IdentityRegistry:
-        """What is known about each person, by automatic number."""
+        """What is known about each person, by automatic number; waits for an association that runs."""
+        self._finish()
         return self._registry
 
     def renumber(self, numbers: Mapping[int, int]) -> None:
@@ -227,9 +231,9 @@ class PersonTracker:
 
         A number that nobody has any more counts as merged, so that its viewers stay with the person.
         """
-        self._registry.renumber(numbers)
+        self.identity.renumber(numbers)
         self.registry.renumber(numbers)
-        self._overrides.renumber(numbers)
+        self.overrides.renumber(numbers)
         self._replace(numbers)
         gone = [old for old in numbers if old not in numbers.values()]
         self._corrections += [Merge(numbers[old], old) for old in gone]
@@ -277,11 +281,10 @@ class PersonTracker:
 
     def forget_before(self, pulse: int) -> None:
         """Forget the boxes and person numbers before a pulse; record the tracks published until then."""
-        if self.published.frames:
-            began, histories = self._needed_from, self._histories.values()
-            spans = [span for history in histories for span in history.over(began, pulse - 1)]
-            for span in sorted(spans, key=lambda span: span.last):
-                self.published.record(span, self.numbers(span.window.keys, span.last, 1)[:, 0])
+        histories = self._histories.values() if self.published.frames else ()
+        spans = [span for history in histories for span in history.over(self._needed_from, pulse - 1)]
+        for span in sorted(spans, key=lambda span: span.last):
+            self.published.record(span, self.numbers(span.window.keys, span.last, 1)[:, 0])
         self._needed_from = max(self._needed_from, pulse)
         self.undetected.forget_before(pulse)
         self._id_switch_repair.keep_only(self._parts, self._needed_from)
@@ -295,7 +298,7 @@ class PersonTracker:
         if window.message.revised_from is not None:
             before = history.over(window.first, window.fresh - 1)
             window, splits = self._id_switch_repair.repair(window, before, self._parts, self._needed_from)
-            self._corrections += self._overrides.map_splits(splits)
+            self._corrections += self.overrides.map_splits(splits)
         history.put(window, window.first, window.message.last)
         return window
 
@@ -322,7 +325,7 @@ class PersonTracker:
         for name, key in appeared.items():
             if (expected := self.expected.take(name)) is not None:
                 number, pulse = expected
-                self._registry.recall(key, self.registry.current(number), pulse)
+                self.identity.recall(key, self.registry.current(number), pulse)
 
     def _merge(self, kept: int, lost: int) -> None:
         self.registry.merge(kept, lost)
@@ -332,10 +335,7 @@ class PersonTracker:
         """Replace numbers in the tracks."""
         self.of_service.renumber(numbers)
         self._id_switch_repair.merge(numbers)
-        self._parts = {
-            key: [TrackPart(part.first, numbers.get(part.number, part.number)) for part in parts]
-            for key, parts in self._parts.items()
-        }
+        replace_numbers(self._parts, numbers)
 
     def _forget(self, now: int) -> None:
         """Forget tracks and people not seen for ``forget_after`` frames, as the registry does."""

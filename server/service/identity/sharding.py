@@ -111,6 +111,10 @@ class PeopleByNumber:
         """Ignore it: nothing is known about single people."""
 
 
+ALL_PEOPLE = PeopleByNumber(ShareSettings())
+"""A single service has all people."""
+
+
 class PeopleOfArea:
     """People are divided by area. Who is at a border is known to both services, under one number.
 

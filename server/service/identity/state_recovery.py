@@ -49,7 +49,7 @@ def state_for_cameras(
     for old, number in people.registry.merged.items():
         if old <= PERSON_NUMBER_MAX:
             former.setdefault(number, []).append(old)
-    manual = set(people.manual_merges.values())
+    manual = set(people.overrides.merged.values())
     known: dict[str, list[PersonSnapshot]] = {camera: [] for camera in cameras}
     for number, tracks in tracks_by_number.items():
         if number > PERSON_NUMBER_MAX:
@@ -68,7 +68,7 @@ def state_for_cameras(
                     manual=number in manual,
                 )
             )
-    next_number = min(people.next_number, PERSON_NUMBER_MAX + 1)
+    next_number = min(people.identity.next_id, PERSON_NUMBER_MAX + 1)
     return {
         camera: CameraIdentitySnapshot(
             pulse=pulse,

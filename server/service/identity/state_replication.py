@@ -188,7 +188,7 @@ class StateReplication:
         recovery.begin(self._people, pulse)
         self._recoveries.append(recovery)
         if self._started_at is None:
-            self._started_at, self._free = self._clock(), self._people.next_number
+            self._started_at, self._free = self._clock(), self._people.identity.next_id
             self._since = min(self._since, recovery.numbered_since)
         if snapshot:
             log.info(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +26,29 @@ class TrackPart(NamedTuple):
 
 UNKNOWN = (TrackPart(0, UNCONFIRMED),)
 """The parts of an unknown track."""
+
+
+Parts = dict[TrackKey, Sequence[TrackPart]]
+"""The parts of each track, in frame order."""
+
+
+def update_parts(parts: Parts, numbers: Mapping[TrackletKey, int], needed_from: int) -> None:
+    """Update, in place, the parts of tracks whose tracklets have these numbers."""
+    for key, new in track_parts(numbers).items():
+        parts[key] = merge_settled_parts(parts.get(key, ()), new, needed_from)
+
+
+def replace_numbers(parts: Parts, numbers: Mapping[int, int]) -> None:
+    """Replace people's numbers, in place."""
+    for key, known in parts.items():
+        parts[key] = [TrackPart(part.first, numbers.get(part.number, part.number)) for part in known]
+
+
+def unconfirm(parts: Parts, numbers: Collection[int]) -> list[TrackKey]:
+    """Take these people's numbers from their tracks, in place; return the tracks."""
+    shown = [key for key, known in parts.items() if any(part.number in numbers for part in known)]
+    replace_numbers(parts, dict.fromkeys(numbers, UNCONFIRMED))
+    return shown
 
 
 def track_parts(numbers: Mapping[TrackletKey, int]) -> dict[TrackKey, list[TrackPart]]:

@@ -232,7 +232,7 @@ class OtherSites:
         ]
         self.elsewhere.forget(gone)
         own = [person.number for person in people if self._people.ids.has(person.number)]
-        most = max(SINGLE_CAMERA_NUMBER_MAX, self._people.next_number)
+        most = max(SINGLE_CAMERA_NUMBER_MAX, self._people.identity.next_id)
         self._people.reserve_numbers_below(min(max(own, default=0) + 1, most))
         looks = self.elsewhere.looks_of(site, told.looks)
         sightings = [

@@ -67,7 +67,7 @@ class AreaAgreement:
         """By area, the first number that was not assigned, as far as is known."""
         known = list(self._next_numbers)
         if known:
-            known[self._share.share] = min(self._people.next_number, PERSON_NUMBER_MAX + 1)
+            known[self._share.share] = min(self._people.identity.next_id, PERSON_NUMBER_MAX + 1)
         return known
 
     def learn_numbers(self, record: ServiceRecord) -> None:

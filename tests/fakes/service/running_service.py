@@ -78,4 +78,6 @@ class RunningService(FedService):
     async def process(self) -> None:
         """Let the service's tasks run."""
         for _ in range(50):
+            if (running := self.decider.people._running) is not None:
+                await running.wait()
             await asyncio.sleep(0)

@@ -119,7 +119,7 @@ def test_a_person_tracked_through_a_restart_keeps_number_and_name() -> None:
     assert [site.person_of(A, 2, 8), site.person_of(B, 3, 8)] == before[1:]
     assert site.person_of(A, 9, 8) > max(before), "no number is used twice"
     assert site.service.decider.people.registry.names == {before[1]: "Ann"}
-    assert site.service.decider.people.manual_merges == {}
+    assert site.service.decider.people.overrides.merged == {}
 
 
 @pytest.mark.parametrize("cut_off", [False, True])
@@ -187,7 +187,7 @@ def test_a_camera_whose_last_window_was_late_is_recovered() -> None:
 def test_tracks_of_a_restarted_camera_are_not_recovered_as_earlier_ones() -> None:
     site = tracked_site()
     site.track_epochs(range(6, 7), {A: {2: SMALL}, B: {}}, boot=2)
-    before, used = site.person_of(A, 2, 6, boot=2), site.service.decider.people.next_number
+    before, used = site.person_of(A, 2, 6, boot=2), site.service.decider.people.identity.next_id
     site.start()
     site.track_epochs(range(7, 9), {A: {1: SMALL, 2: LARGE}, B: {}}, boot=2)
     assert site.person_of(A, 2, 8, boot=2) == before
@@ -479,7 +479,7 @@ def test_no_single_camera_can_raise_the_next_number_far(lie: dict[str, object], 
         site.cameras[B].on_service(is_present=True)
     site.track_epochs(range(9, 12), {A: {1: SMALL, 2: LARGE, 9: SMALL}, B: {3: LARGE}})
     people = site.service.decider.people
-    assert people.next_number <= SINGLE_CAMERA_NUMBER_MAX + 10
+    assert people.identity.next_id <= SINGLE_CAMERA_NUMBER_MAX + 10
     assert site.person_of(A, 2, 11) == ann
     assert people.registry.names == {ann: "Ann"}
 
@@ -490,7 +490,7 @@ def test_large_numbers_confirmed_by_two_cameras_continue() -> None:
         falsify_snapshot(site, camera, next_number=50_000_000 + len(camera))
     site.start()
     site.track_epochs(range(7, 9))
-    assert site.service.decider.people.next_number >= 50_000_000
+    assert site.service.decider.people.identity.next_id >= 50_000_000
 
 
 @given(st.lists(st.integers(1, PERSON_NUMBER_MAX), max_size=6), st.integers(1, PERSON_NUMBER_MAX))

@@ -215,7 +215,7 @@ async def test_a_number_of_another_site_is_restored_and_raises_no_own_one(sites:
     restarted.decide()
     people = restarted.decider.people
     assert people.person_of("c0", 1, A, people.newest) == 3 * 10**8 + 1
-    assert people.next_number == 2
+    assert people.identity.next_id == 2
     restarted.close()
 
 

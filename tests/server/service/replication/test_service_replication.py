@@ -145,7 +145,7 @@ async def test_a_service_that_starts_has_the_numbers_of_the_running_one(services
     numbers = {track: number for track, number in services.numbers(0, 29).items() if track != (A, 8)}
     assert services.numbers(1, 29) == numbers
     assert len(set(numbers.values())) == 3
-    assert [services.running[index].decider.people.next_number for index in (0, 1)] == [5, 5]
+    assert [services.running[index].decider.people.identity.next_id for index in (0, 1)] == [5, 5]
     services.stop(0)
     services.feed(range(30, 40), {A: {1: SMALL, 2: LARGE, 4: SMALL}, B: {3: SMALL}})
     assert services.numbers(1, 39) == numbers | {(A, 4): 5}
