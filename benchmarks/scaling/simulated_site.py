@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO
@@ -19,6 +19,7 @@ from typing import IO
 import yaml
 
 from benchmarks.common.environment import ROOT, one_thread_environment
+from benchmarks.overload.responsiveness import lag_below
 from benchmarks.scaling.simulated_hall import FPS, HEIGHT, STRIDE, WIDTH, SimulatedHall
 from benchmarks.scaling.timed_service import LISTS, REST, STAGES, ServiceTimes
 from server.cli.generated_config import free_port
@@ -43,6 +44,7 @@ class SiteLoad:
         megabytes: per second, likewise.
         memory: resident megabytes at the end.
         late: late windows in the measured time.
+        lag: seconds by which the event loop was late at most in 95 % of the measured time.
         epochs: measured epochs.
     """
 
@@ -56,6 +58,7 @@ class SiteLoad:
     megabytes: float
     memory: float
     late: int
+    lag: float
     epochs: int
 
     @property
@@ -84,20 +87,23 @@ def carry(
     folder.mkdir(parents=True)
     with _running(hall, fps, folder, services) as running:
         starts = [_after(service.times, settle, folder) for service in running]
-        late = sum(_late(service.url) for service in running)
+        before = [_Metrics.read(service.url) for service in running]
         stops = [
             _after(service.times, start.epochs + epochs, folder)
             for service, start in zip(running, starts, strict=True)
         ]
-        late = sum(_late(service.url) for service in running) - late
+        after = [_Metrics.read(service.url) for service in running]
         memory = sum(_resident(service.process.pid) for service in running) / services
-    loads = [_load(hall, fps, start, stop, memory, late) for start, stop in zip(starts, stops, strict=True)]
+    loads = [_load(hall, fps, start, stop, memory) for start, stop in zip(starts, stops, strict=True)]
     stages = {name: sum(load.stages[name] for load in loads) / services for name in loads[0].stages}
-    return replace(loads[0], services=services, stages=stages)
+    since = list(zip(before, after, strict=True))
+    late = sum(new.late - old.late for old, new in since)
+    lag = max(new.lag_since(old) for old, new in since)
+    return replace(loads[0], services=services, stages=stages, late=late, lag=lag)
 
 
 def _load(
-    hall: SimulatedHall, fps: float, start: ServiceTimes, stop: ServiceTimes, memory: float, late: int
+    hall: SimulatedHall, fps: float, start: ServiceTimes, stop: ServiceTimes, memory: float
 ) -> SiteLoad:
     frames = STRIDE * (stop.epochs - start.epochs)
     stages = {name: 1e3 * (stop.seconds[name] - start.seconds[name]) / frames for name in STAGES}
@@ -114,7 +120,8 @@ def _load(
         messages=FPS * (stop.messages - start.messages) / frames,
         megabytes=FPS * (stop.size - start.size) / frames / 1e6,
         memory=memory,
-        late=late,
+        late=0,
+        lag=0.0,
         epochs=stop.epochs - start.epochs,
     )
 
@@ -194,15 +201,28 @@ def _after(times: Path, epochs: int, folder: Path) -> ServiceTimes:
     raise RuntimeError(f"the site did not reach epoch {epochs}; its log:\n{said[-2000:]}")
 
 
-def _late(url: str) -> int:
-    """Read the windows that were decided without a present camera."""
-    with urllib.request.urlopen(f"{url}metrics", timeout=_PATIENCE_S) as answer:  # noqa: S310 — own address
-        metrics = answer.read().decode()
-    return next(
-        int(float(line.split()[1]))
-        for line in metrics.splitlines()
-        if line.startswith("myview_late_epochs_total")
-    )
+@dataclass(frozen=True, slots=True)
+class _Metrics:
+    """What a service says of itself: windows that were decided without their camera, and its loop's lag."""
+
+    late: int
+    lags: Mapping[float, float]
+    """By bound in seconds, how often the event loop was late by at most that."""
+
+    @classmethod
+    def read(cls, url: str) -> _Metrics:
+        with urllib.request.urlopen(f"{url}metrics", timeout=_PATIENCE_S) as answer:  # noqa: S310 — own address
+            lines = answer.read().decode().splitlines()
+        late = next(line for line in lines if line.startswith("myview_late_epochs_total"))
+        lags = [line for line in lines if line.startswith("myview_loop_lag_seconds_bucket")]
+        return cls(
+            int(float(late.split()[1])),
+            {float(line.split('"')[1]): float(line.rsplit(" ", 1)[1]) for line in lags},
+        )
+
+    def lag_since(self, before: _Metrics) -> float:
+        """Return the bound below which 95 % of the lags since are."""
+        return lag_below(0.95, [(bound, count - before.lags[bound]) for bound, count in self.lags.items()])
 
 
 def _resident(pid: int) -> float:

@@ -97,6 +97,7 @@ def watch(path: Path) -> None:
         (Ingest, "thumbnail", "ingest frames"),
         (EpochAligner, "take_next_ready", "align"),
         (IdentityRegistry, "update", "identities"),
+        (PersonTracker, "_begin", "people"),
         (PersonTracker, "update", "people"),
         (ViewQualityBuffer, "put", "quality"),
         (LookaheadWindow, "__init__", "costs"),
