@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 _PROC = Path("/proc")
 _TICKS = os.sysconf("SC_CLK_TCK")
 _PARENT, _USER, _SYSTEM = 1, 11, 12
@@ -110,3 +112,8 @@ def _words(pid: int) -> list[str]:
         return (_PROC / str(pid) / "cmdline").read_bytes().decode(errors="replace").split("\0")
     except OSError:
         return []
+
+
+def lag_below(share: float, lags: Sequence[tuple[float, float]]) -> float:
+    """Return the histogram bound in seconds below which this share of the lags is."""
+    return next((bound for bound, count in lags if count >= share * lags[-1][1]), np.nan)

@@ -16,7 +16,6 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -25,6 +24,7 @@ import numpy as np
 import yaml
 
 from benchmarks.common.environment import ROOT, one_thread_environment, parser
+from benchmarks.common.process_load import lag_below
 from benchmarks.common.report import Report
 from server.cli.generated_config import free_port
 from server.http.metrics.event_loop_lag import LoopLag
@@ -82,11 +82,6 @@ class Responsiveness:
         if not late or late[0] == late[-1]:
             return np.nan
         return (late[-1][1] - late[0][1]) / (late[-1][0] - late[0][0])
-
-
-def lag_below(share: float, lags: Sequence[tuple[float, float]]) -> float:
-    """Return the histogram bound in seconds below which this share of the lags is."""
-    return next((bound for bound, count in lags if count >= share * lags[-1][1]), np.nan)
 
 
 async def measure_site(config: Path, port: int, niceness: int, seconds: float, log: Path) -> Responsiveness:

@@ -95,8 +95,10 @@ def describe(report: Report, loads: Sequence[SiteLoad]) -> None:
         ["stage", *(f"{camera}" for camera in cameras), "grows", "what"],
         rows,
     )
-    report.line("messages and bytes: at 25 pulses a second; late: windows decided without their camera; "
-        "lag: of the event loop, in 95 % of the time")
+    report.line(
+        "messages and bytes: at 25 pulses a second; late: windows decided without their camera; "
+        "lag: of the event loop, in 95 % of the time"
+    )
     size = track_message_size(SimulatedHall(loads[0].cameras, loads[0].per_camera))
     report.line(
         f"tracks of a camera with {loads[0].per_camera} people: {size.packed:.0f} kB a second"

@@ -19,7 +19,7 @@ from typing import IO
 import yaml
 
 from benchmarks.common.environment import ROOT, one_thread_environment
-from benchmarks.overload.responsiveness import lag_below
+from benchmarks.common.process_load import lag_below
 from benchmarks.scaling.simulated_hall import FPS, HEIGHT, STRIDE, WIDTH, SimulatedHall
 from benchmarks.scaling.timed_service import LISTS, REST, STAGES, ServiceTimes
 from server.cli.generated_config import free_port

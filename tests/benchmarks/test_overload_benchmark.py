@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.common.process_load import lag_below
 from benchmarks.overload.__main__ import load, summarize_step
 from benchmarks.overload.growing_site import run_growing_site
 from benchmarks.overload.overload_report import plot
-from benchmarks.overload.responsiveness import Responsiveness, lag_below, row
+from benchmarks.overload.responsiveness import Responsiveness, row
 from benchmarks.overload.samples import LoadStep, OverloadResult, SiteSample
 
 CALM = SiteSample(
