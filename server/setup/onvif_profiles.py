@@ -39,7 +39,7 @@ def query_profiles(request: ProfilesRequest) -> ProfileList:
     except UserError as error:
         return ProfileList(error=str(error))
     except (Exception, RecursionError) as error:  # noqa: BLE001 — the library raises what the answer leads it to
-        return _failure(error)
+        return _failure(error, request.user)
 
 
 async def _query(request: ProfilesRequest) -> ProfileList:
@@ -110,12 +110,13 @@ def _bounded(value: Any, most: float) -> float:
     return number if 0 <= number <= most else 0.0
 
 
-def _failure(error: BaseException) -> ProfileList:
+def _failure(error: BaseException, user: str) -> ProfileList:
     """Return the line for an error of the library, whose text may contain anything the camera sent."""
     text = f"{type(error).__name__} {error}".lower()
     words = ("auth", "not authorized", "unauthorized", "401", "sender not", "password")
     if any(word in text for word in words):
-        return ProfileList(error="it refuses this user and password", needs_password=True)
+        reason = "it refuses this user and password" if user else "it wants a user and password"
+        return ProfileList(error=reason, needs_password=True)
     if isinstance(error, OSError) or "connect" in text or "timeout" in text:
         return ProfileList(error="its ONVIF service cannot be reached")
     return ProfileList(error="its ONVIF answer cannot be read; enter the address")

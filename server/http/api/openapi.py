@@ -112,6 +112,7 @@ _SCHEMAS: dict[str, Any] = {
     "segment": {"type": "integer", "minimum": 0},
     "session": {"type": "string", "pattern": "^[A-Za-z0-9_-]{22}$"},
     "part": {"type": "integer", "minimum": 0},
+    "key": {"type": "integer", "minimum": 0},
     "_HLS_msn": {"type": "integer", "minimum": 0, "description": "The answer waits for this segment."},
     "_HLS_part": {
         "type": "integer",
@@ -238,7 +239,12 @@ def _operation(path: str, summary: str) -> dict[str, Any]:
 
 
 def _success(path: str, content: Any, error: Any) -> dict[str, Any]:
-    """Return the response to a valid request, and WHEP's errors."""
+    """Return the responses to a valid request, and WHEP's errors."""
+    if path.endswith("/trials/{key}"):
+        return {
+            "200": {"description": "What the request that began it answers.", "content": {}},
+            "202": {"description": "It has no result yet.", "content": content},
+        }
     if not path.endswith("/whep"):
         return {"200": {"description": "OK", "content": content}}
     return {

@@ -53,9 +53,11 @@ async def test_a_found_camera_is_asked_tried_named_and_written(
             monkeypatch.setenv("MYVIEW_DISCOVERY", targets)
             (found,) = await session.discover(1.0)
             refused, _ = await session.profiles(found.host, found.port, "viewer", "wrong")
+            unnamed, _ = await session.profiles(found.host, found.port, "", "")
             answer, keys = await session.profiles(found.host, found.port, *LOGIN)
         assert refused.needs_password
-        assert "password" in refused.error
+        assert refused.error == "it refuses this user and password"
+        assert (unnamed.error, unnamed.needs_password) == ("it wants a user and password", True)
         assert [(profile.name, profile.width) for profile in answer.profiles] == [("main", 64), ("sub", 32)]
         tried = await session.add(session.offered(keys[0]), found.name)
         with pytest.raises(UserError, match="in the list already"):
