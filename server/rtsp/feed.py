@@ -1,8 +1,9 @@
 """Feeds: each takes one stream from the service and pushes its samples into the pipeline of an RTSP media.
 
 A feed goes on through everything that passes: a restart of the service, a camera's death, other parameter
-sets, and a client's pause, after which it is live. It ends when the service refuses the stream for good (a
-revoked token), when the stream is gone for a minute (a forgotten person), or when its client leaves.
+sets, somebody's walk into another area or site, and a client's pause, after which it is live. It ends when
+the service refuses the stream for good (a revoked token), when the stream is gone for a minute (a forgotten
+person), or when its client leaves.
 """
 
 from __future__ import annotations

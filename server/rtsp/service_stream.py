@@ -1,4 +1,9 @@
-"""A stream of the best-view service over HTTP, as bytes, with the token of the RTSP client that asked."""
+"""A stream of the best-view service over HTTP, as bytes, with the token of the RTSP client that asked.
+
+Who is in another area or site is redirected there (307), and the gateway follows by itself: it is not known
+which RTSP gateway another service has, and players follow an RTSP redirect (RFC 2326, 11.3) at the beginning
+alone, so that a walk would end their stream.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +21,9 @@ _SILENT_S = 10.0
 """Seconds without a byte after which the service counts as gone: streams have no gaps."""
 _READ_BYTES = 65_536
 _OK = 200
+_REDIRECTS = {301, 302, 307, 308}
+_REDIRECTS_MAX = 4
+"""In a row: two services may each believe for a moment that the other one has somebody."""
 
 
 class StreamRefusedError(Exception):
@@ -39,25 +47,42 @@ class Service:
     """PEM file: trust exactly this certificate, whatever host it names; None: the system's authorities."""
 
     def open(self, path: str, token: str | None) -> ServiceStream:
-        """Open a stream.
+        """Open a stream, wherever the service redirects to.
 
         Raises:
             StreamRefusedError: the service refuses it; 401: it needs a token, or another one.
-            ServiceAwayError: it does not answer.
+            ServiceAwayError: it does not answer, or redirects to where nothing can be had.
         """
-        address = urllib.parse.urlsplit(self.url)
-        host, port = address.hostname or "127.0.0.1", address.port
+        # In the query, so that a redirect has the token where the other service or site may know it.
+        query = "" if token is None else f"?token={urllib.parse.quote(token, safe='')}"
+        url = urllib.parse.urljoin(self.url, path) + query
+        for number in range(_REDIRECTS_MAX + 1):
+            found = self._request(url, is_own=not number)
+            if isinstance(found, ServiceStream):
+                return found
+            url = urllib.parse.urljoin(url, found)
+        raise ServiceAwayError("it redirects too often")
+
+    def _request(self, url: str, *, is_own: bool) -> ServiceStream | str:
+        """Return a stream, or the address to which the server redirects."""
+        address = urllib.parse.urlsplit(url)
+        is_encrypted = address.scheme == "https"
+        if not is_own and not is_encrypted and self.url.startswith("https:"):
+            raise ServiceAwayError(f"it redirects to {address.hostname}, which does not encrypt")
         # Via: the server's own machine may operate, but what is sent on to other machines may not.
         headers = {"Via": "1.1 myview-rtsp", "User-Agent": "myview-rtsp"}
-        if token is not None:
-            headers["Authorization"] = f"Bearer {token}"
         connection: http.client.HTTPConnection
-        if address.scheme == "https":
-            connection = http.client.HTTPSConnection(host, port, timeout=_CONNECT_S, context=self._trust())
-        else:
-            connection = http.client.HTTPConnection(host, port, timeout=_CONNECT_S)
         try:
-            connection.request("GET", path, headers=headers)
+            host, port = address.hostname or "127.0.0.1", address.port
+            if is_encrypted:
+                trust = self._trust() if is_own else self._trust_of_others()
+                connection = http.client.HTTPSConnection(host, port, timeout=_CONNECT_S, context=trust)
+            else:
+                connection = http.client.HTTPConnection(host, port, timeout=_CONNECT_S)
+        except (OSError, ValueError) as error:  # an address or certificate that is none
+            raise ServiceAwayError(str(error)) from error
+        try:
+            connection.request("GET", urllib.parse.urlunsplit(("", "", *address[2:4], "")), headers=headers)
             response = connection.getresponse()
             connected = connection.sock
             connected.settimeout(_SILENT_S)
@@ -65,8 +90,11 @@ class Service:
             connection.close()
             raise ServiceAwayError(str(error) or type(error).__name__) from error
         if response.status != _OK:
+            location = response.getheader("Location")
             response.close()
             connection.close()
+            if response.status in _REDIRECTS and location:
+                return location
             raise StreamRefusedError(response.status)
         return ServiceStream(response, connected)
 
@@ -74,6 +102,14 @@ class Service:
         trust = ssl.create_default_context(cafile=self.certificate)
         if self.certificate is not None:
             trust.check_hostname = False  # it names the public host, not the one used here
+            trust.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
+        return trust
+
+    def _trust_of_others(self) -> ssl.SSLContext:
+        """Return the context for other services, which are named by their public host."""
+        trust = ssl.create_default_context()
+        if self.certificate is not None:
+            trust.load_verify_locations(self.certificate)
             trust.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
         return trust
 

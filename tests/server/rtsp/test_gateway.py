@@ -36,6 +36,7 @@ from fakes.system.ports import free_port
 from fakes.timeouts import PATIENCE
 from server.media.picture import Codec
 from server.messaging.epochs import end_of_epoch
+from server.service.identity.sharding import OtherArea, PeopleOfArea
 
 pytestmark = needs_gstreamer
 
@@ -310,6 +311,46 @@ async def test_a_client_goes_on_when_the_connection_to_the_service_breaks(site: 
     shown = [own[pixels(frame)] for frame in frames if pixels(frame) in own]
     assert len(shown) > len(frames) / 2, "all but those with a picture missing before them"
     assert all(0 < step < PICTURES / 2 for step in steps(shown))
+
+
+async def test_a_client_stays_when_somebody_walks_into_another_area(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = [await asyncio.to_thread(own_pictures, camera) for camera in range(len(CAMERAS))]
+    areas = [{"cameras": ["c0"], "also": ["c1"]}, {"cameras": ["c1"], "also": ["c0"]}]
+    async with serve_with_tokens(tmp_path) as east, live(east):
+        servers = ["http://127.0.0.1:1/", f"http://127.0.0.1:{east.port}/"]
+        share = {"of": 2, "areas": areas, "servers": servers}
+        async with (
+            serve_with_tokens(tmp_path, view={"share": share}) as west,
+            live(west),
+            run_gateway(west.port) as gateway,
+            watching(gateway.url("/objects/1", token_of("desk"))) as frames,
+        ):
+            area = west.service.decider.people.of_service
+            assert isinstance(area, PeopleOfArea)
+            await more(frames, FPS)
+            assert east.service.splicer.viewers == 0
+            area.hear({1: OtherArea(1, 1_000_000)})
+            monkeypatch.setattr(area, "hear", lambda _: None)  # and the other service says so from now on
+            await until(lambda: east.service.splicer.viewers == 1)
+            await more(frames, 2 * FPS)
+            assert len(await frames_of(gateway.url("/objects/1", token_of("family")), 3)) == 3, "from there"
+            assert (await gateway.describe("/objects/1"))[0] == 401
+            assert west.service.splicer.viewers == 0
+    shown = [frame for frame in frames if any(pixels(frame) in one for one in own)]
+    assert len(shown) > 0.9 * len(frames)
+
+
+async def test_services_that_redirect_to_each_other_are_unavailable(tmp_path: Path) -> None:
+    async with serve_with_tokens(tmp_path, view={"share": {"of": 2, "index": 1}}) as served:
+        share = served.service.config.view.share.model_copy(
+            update={"servers": [f"http://127.0.0.1:{served.port}/"] * 2}
+        )
+        view = served.service.config.view.model_copy(update={"share": share})
+        served.service.config = served.service.config.model_copy(update={"view": view})
+        async with run_gateway(served.port) as gateway:
+            assert (await gateway.describe("/objects/2", basic("any", token_of("desk"))))[0] == 503
 
 
 async def test_without_a_service_streams_are_unavailable() -> None:
