@@ -18,6 +18,7 @@ from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
 from benchmarks.scaling.divided_hall import DividedRun, agreement, observe, run_divided
 from benchmarks.scaling.simulated_hall import FPS, SimulatedHall
+from server.supervisor.bestview_process import collect_garbage_rarely
 
 _CAMERAS, _SERVICES = (8, 36, 100), (1, 2, 4, 8)
 _QUICK_CAMERAS, _QUICK_SERVICES = (8, 16), (1, 2)
@@ -67,6 +68,7 @@ def plot(times: dict[int, dict[int, DividedRun]], path: Path) -> None:
 def measure(options: argparse.Namespace) -> None:
     """Run every size, print and save."""
     options.out.mkdir(parents=True, exist_ok=True)
+    collect_garbage_rarely()
     report = Report()
     sizes = options.cameras or (_QUICK_CAMERAS if options.quick else _CAMERAS)
     counts = _QUICK_SERVICES if options.quick else _SERVICES

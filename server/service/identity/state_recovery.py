@@ -58,15 +58,11 @@ def state_for_cameras(
         for track in tracks:
             if track.boot == boots[track.camera]:  # tracks of an earlier run of the camera have ended
                 camera_tracks.setdefault(track.camera, []).append(track.track)
+        aliases, name = former.get(number, [])[-ALIASES_MAX:], people.registry.names.get(number, "")
+        is_manual = number in manual
         for camera, local_ids in camera_tracks.items():
             known[camera].append(
-                PersonSnapshot(
-                    number=number,
-                    tracks=local_ids,
-                    aliases=former.get(number, [])[-ALIASES_MAX:],
-                    name=people.registry.names.get(number, ""),
-                    manual=number in manual,
-                )
+                PersonSnapshot(number=number, tracks=local_ids, aliases=aliases, name=name, manual=is_manual)
             )
     next_number = min(people.identity.next_id, PERSON_NUMBER_MAX + 1)
     return {
