@@ -9,7 +9,7 @@ from pathlib import Path
 import yaml
 
 from server.config.config_diff import changed_keys
-from server.config.loader import build_config, load_config, read_content
+from server.config.loader import build_config, read_content
 from server.config.site_config import Config
 from server.system.errors import UserError
 from server.system.file_state import FileState, file_state
@@ -58,7 +58,7 @@ class ActiveConfig:
         """
         active_file = os.environ.get(ACTIVE_CONFIG_VARIABLE)
         if active_file is None or not is_owned_by_this_user(Path(active_file)):
-            return load_config(self.path)
+            return self._read_file()
         return build_config(read_content(Path(active_file)), where=str(self.path), folder=self.path.parent)
 
     def on_disk(self) -> ConfigFileState:
@@ -72,12 +72,17 @@ class ActiveConfig:
         if seen != self._seen or isinstance(self._file, UserError):
             self._seen = seen
             try:
-                self._file = load_config(self.path)
+                self._file = self._read_file()
             except UserError as error:
                 self._file = error
         if isinstance(self._file, UserError):
             return ConfigFileState(str(self._file), ())
         return ConfigFileState("", changed_keys(self.now, self._file))
+
+    def _read_file(self) -> Config:
+        """Read the file, with absolute paths: those of the supervisor's active configuration are."""
+        content = read_content(self.path)
+        return build_config(content, where=str(self.path), folder=self.path.parent.absolute())
 
 
 def serialize_with_absolute_paths(config: Config, folder: Path) -> str:

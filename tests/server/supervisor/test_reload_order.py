@@ -9,7 +9,11 @@ import pytest
 import yaml
 
 from fakes.service.scripted_cameras import small_config
-from server.config.running_config import ACTIVE_CONFIG_VARIABLE, ActiveConfig
+from server.config.running_config import (
+    ACTIVE_CONFIG_VARIABLE,
+    ActiveConfig,
+    serialize_with_absolute_paths,
+)
 from server.supervisor.reload import plan_reload
 
 
@@ -50,3 +54,19 @@ def test_an_active_configuration_of_another_user_is_ignored(
     assert ActiveConfig(path).now.camera_ids == ("c9",), "of the supervisor"
     monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
     assert ActiveConfig(path).now.camera_ids == ("c0",)
+
+
+def test_a_file_that_is_named_from_its_own_folder_differs_from_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`myview up` in the folder of site.yaml, as set-up starts it."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "secret").write_text("word\n")
+    path = Path("site.yaml")
+    path.write_text("cameras: [{id: c0, source: 'rtsp://u:{password}@10.0.0.1/', password: secret}]\n")
+    supervisor = ActiveConfig(path)
+    active = tmp_path / "active.yaml"
+    active.write_text(serialize_with_absolute_paths(supervisor.now, path.parent))
+    assert not supervisor.on_disk().differs
+    monkeypatch.setenv(ACTIVE_CONFIG_VARIABLE, str(active))
+    assert ActiveConfig(path).on_disk().changed_keys == ()
