@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import asyncio
 import itertools
+import logging
+import secrets
 from collections.abc import Coroutine
 from typing import Any
 
@@ -19,12 +21,16 @@ from server.http.json_responses import error_response, json_response
 from server.http.operator.schema import TrialProgress
 from server.system.errors import UserError
 
+log = logging.getLogger(__name__)
+
 routes = web.RouteTableDef()
 
 _ANSWER_S = 1.0
 """Time in which a request answers."""
 _KEPT = 64
-"""Trials whose results are kept, the latest; as many run at a time."""
+"""The latest trials, whose results are kept; an earlier one is kept until another starts after its end."""
+_FIRST_KEYS = 900_000_000
+"""Keys begin anywhere below, so that a page that asks after a restart gets no other trial's result."""
 _GONE = "this trial is not known any more: look whether the camera is there, else try it again"
 
 
@@ -33,7 +39,7 @@ class CameraTrials:
 
     def __init__(self) -> None:
         self._tasks: dict[int, asyncio.Task[web.Response]] = {}
-        self._keys = itertools.count(1)
+        self._keys = itertools.count(secrets.randbelow(_FIRST_KEYS))
 
     def start(self, work: Coroutine[Any, Any, web.Response]) -> int:
         """Start a trial, whose work returns what is answered in the end; return its key."""
@@ -91,3 +97,6 @@ async def _answer_errors(work: Coroutine[Any, Any, web.Response]) -> web.Respons
         return await work
     except UserError as error:
         return error_response(400, str(error))
+    except Exception:
+        log.exception("a trial of a camera failed")
+        return error_response(409, "the trial failed: see the service's log")  # pages ask again after a 500

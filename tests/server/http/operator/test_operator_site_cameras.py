@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import socket
 from collections.abc import AsyncIterator, Iterator
 from contextlib import aclosing
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from aiohttp import web
 
 from fakes.http.tokens import bearer, serve_with_tokens
 from fakes.media.rtsp_camera import RtspCamera
@@ -24,7 +24,9 @@ from server.config.loader import load_config
 from server.config.sections import EncodeSettings, SiteSettings
 from server.http.access.csrf import CSRF_HEADER
 from server.http.app_keys import SiteControl
+from server.http.operator.trials import CameraTrials
 from server.setup.camera_address import parse_address
+from server.setup.trial_messages import StreamRequest, StreamTrial, try_stream
 
 PATH = "/api/operator/site_cameras"
 LOGIN = ("viewer", "p@ss:/w0rd")
@@ -119,31 +121,59 @@ async def test_what_is_in_pixels_follows_the_pictures_that_were_tried(
     assert load_config(path).zones[0].area == [(0, 0), (80, 0), (80, 60)]
 
 
-async def test_a_trial_that_waits_for_others_says_for_how_many(site: ServedSite, path: Path) -> None:
-    """Cameras that accept a connection and then say nothing are tried for many seconds."""
-
+async def test_a_trial_that_waits_for_others_says_for_how_many(
+    site: ServedSite, path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     async def ask(place: str, body: Any = None) -> tuple[int, dict[str, Any]]:
         method = "GET" if body is None else "POST"
         async with site.session.request(method, place, json=body, headers=CHANGES) as answer:
             return answer.status, json.loads(await answer.text())
 
-    silent = [socket.create_server(("127.0.0.1", 0)) for _ in range(3)]
-    bodies = [{"address": f"rtsp://127.0.0.1:{each.getsockname()[1]}/"} for each in silent]
+    may_go_on = asyncio.Event()
+
+    async def try_later(request: StreamRequest) -> StreamTrial:
+        await may_go_on.wait()
+        return await try_stream(request)
+
+    monkeypatch.setattr("server.setup.session.try_stream", try_later)
+    bodies = [{"address": f"rtsp://127.0.0.1:{port}/"} for port in (1, 2, 3)]
     answers = await asyncio.gather(*(ask(PATH, body) for body in bodies))
     trials = [f"/api/operator/setup/trials/{answer['trial']}" for _, answer in answers]
     while sorted(answer["ahead"] for _, answer in answers) != [0, 0, 1]:  # one may not be in the queue yet
         answers = await asyncio.gather(*map(ask, trials))
     assert {status for status, _ in answers} == {202}
-    for each in silent:
-        each.close()
+    may_go_on.set()
     for trial in trials:
         while (answer := await ask(trial))[0] == 202:
             pass
         status, result = answer
         assert status == 400
         assert result["error"].startswith("rtsp://127.0.0.1:")
-    assert (await ask("/api/operator/setup/trials/99"))[0] == 404
+    assert (await ask("/api/operator/setup/trials/999999999"))[0] == 404
     assert path.read_text() == TEXT
+
+
+async def test_a_trial_that_fails_unexpectedly_ends_with_an_error_that_is_not_asked_for_again(
+    site: ServedSite, path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def fail(_: StreamRequest) -> StreamTrial:
+        raise RuntimeError("unexpected")
+
+    monkeypatch.setattr("server.setup.session.try_stream", fail)
+    body = {"address": "rtsp://127.0.0.1:1/"}
+    assert await send(site, "POST", body) == (409, {"error": "the trial failed: see the service's log"})
+    (logged,) = [record for record in caplog.records if record.exc_info]
+    assert logged.getMessage() == "a trial of a camera failed"
+    assert path.read_text() == TEXT
+
+
+async def test_a_service_that_starts_again_has_other_keys_of_trials() -> None:
+    async def work() -> web.Response:
+        return web.Response()
+
+    keys = [CameraTrials().start(work()) for _ in range(8)]
+    assert len(set(keys)) == 8
+    assert max(keys) < 1_000_000_000, "the route has nine digits"
 
 
 @pytest.mark.parametrize(
