@@ -11,7 +11,7 @@ from server.messaging.messages import ZenohKeys
 
 
 class UnavailabilityReport:
-    """Sends the present reason whenever it changes, and to each service that connects.
+    """Sends the present reason after each attempt, and to each service that connects.
 
     It has a connection of its own, from the first reason on until it is closed.
     """

@@ -77,9 +77,9 @@ class PassthroughStream(LiveStream):
         Raises:
             UnavailableError: its stream does not fit any more; the caller has to open the camera again.
         """
-        if self._misfit:
+        if misfit := self._misfit:
             name = redact_to_host(self._url)
-            raise UnavailableError(f"{name}: its stream does not fit any more: {self._misfit}")
+            raise UnavailableError(f"{name}: its stream does not fit any more: {misfit}")
         with self._waiting_lock:
             self.current = unit = self._waiting.take(pulse)
         self.captured = None if unit is None else unit.captured
@@ -96,6 +96,7 @@ class PassthroughStream(LiveStream):
         except IncompatibleStreamError as error:
             self._misfit = str(error)
             return False
+        self._misfit = ""
         decode_without_delay(opened)
         self._is_decodable, self._continuity = False, self._required.codec.continuity()
         return super()._accept(opened)

@@ -30,7 +30,7 @@ class TracksOfPeople:
 
 @dataclass(frozen=True, slots=True)
 class OtherArea:
-    """The area that another service says a person is in, and the frame in which they certainly were there."""
+    """The first other area that has a person, and the last frame in which they certainly were there."""
 
     area: int
     here: int
@@ -153,7 +153,7 @@ class PeopleOfArea:
         return self._elsewhere[number].area
 
     def is_reported(self, number: int) -> bool:
-        """Return whether nobody else has a person, or of both areas this is the first."""
+        """Return whether nobody else has a person, or of all their areas this is the first."""
         other = self._elsewhere.get(number)
         return other is None or (number in self._seen and self._share.share < other.area)
 

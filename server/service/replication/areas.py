@@ -110,10 +110,12 @@ class AreaAgreement:
         if not isinstance(area, PeopleOfArea):
             return 0
         others = [record for record in live if self.is_other(record)]
+        of = self._share.of
+        last_area_first = sorted(others, key=lambda record: record.service % of, reverse=True)
         area.hear(
             {
-                number: OtherArea(record.service % self._share.of, stay.here)
-                for record in others
+                number: OtherArea(record.service % of, stay.here)
+                for record in last_area_first
                 for number, stay in record.in_area.items()
             }
         )

@@ -446,6 +446,12 @@ def test_a_network_camera_that_returns_with_another_size_is_to_be_opened_again(t
             source.take(-1)
         except UnavailableError as error:
             refusal = str(error)
+    (tmp_path / "first.h264").write_bytes(first_part)
+    (tmp_path / "first.h264").replace(path)
+    while source._misfit:  # until it fits again
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    source.take(-1)
     source.close()
     wanted = f"its frames are {2 * WIDTH}x{2 * HEIGHT}, the site's {WIDTH}x{HEIGHT} (site.width, site.height)"
     assert refusal.endswith(f": its stream does not fit any more: {wanted}")

@@ -107,6 +107,24 @@ class TestAgreement:
         agreement.receive(msgspec.structs.replace(there, cameras={"c1": snapshot}))
         assert people.registry.names == {1: "Ann 1"}, "2 is not there, 77 is not known here"
 
+    @pytest.mark.parametrize("area", [0, 1, 2])
+    def test_somebody_in_three_areas_is_reported_by_the_first(self, area: int) -> None:
+        cameras = [{"id": name, "source": "scene:room"} for name in ("c0", "c1", "c2")]
+        areas = [{"cameras": ["c0"]}, {"cameras": ["c1"]}, {"cameras": ["c2"]}]
+        share = {"of": 3, "index": area, "areas": areas}
+        service = FedService(small_config(cameras=cameras, view={"share": share}).of_service())
+        people = service.decider.people
+        people._registry = TrackNumbers()  # type: ignore[assignment]
+        service.connect_cameras(f"c{area}")
+        for epoch in range(4):
+            service.feed(epoch, {f"c{area}": {1: SMALL}})
+        agreement = AreaAgreement(service.config.view.share, people)
+        others = [self.record(other, 20, {1: 1}, {1: 0}) for other in range(3) if other != area]
+        for live in (others, others[::-1]):
+            agreement.step({}, live)
+            assert people.of_service.is_reported(1) is (area == 0)
+        service.close()
+
     def test_numbers_that_another_service_remembers_are_not_assigned_again(
         self, service: FedService, monkeypatch: pytest.MonkeyPatch
     ) -> None:
