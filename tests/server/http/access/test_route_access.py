@@ -122,6 +122,7 @@ def fill_path(path: str, number: int = 1, camera: str = A) -> str:
         "object": number,
         "camera": camera,
         "event": "1-2-3",
+        "key": 1,
         "segment": 0,
         "session": "x" * 22,
         "part": 0,
