@@ -67,7 +67,6 @@ ABLATIONS = (
         "hidden objects are never dropped",
         {"window": {"forget_after_s": PAPER.window.forget_after_s, "max_objects": PAPER.window.max_objects}},
     ),
-    Ablation("no ids are exchanged back", {"window": {"exchange_min_gain": PAPER.window.exchange_min_gain}}),
     Ablation("fixed templates", {"window": {"template_memory_s": 1e6}}),
     Ablation("the paper's layout term", {"costs": {"layout": PAPER.costs.layout}}),
     Ablation("unknown appearance costs nothing", {"costs": {"unknown_appearance": 0.0}}),

@@ -62,7 +62,6 @@ def _window(frames: int) -> WindowSettings:
         max_height_ratio=_FOR_EVER,
         max_interpolated_gap_s=0.0,
         reidentify_after_s=_FOR_EVER,
-        exchange_min_gain=1.0,
     )
 
 

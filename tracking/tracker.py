@@ -13,7 +13,6 @@ from tracking.boxes import Floats, iou
 from tracking.detectors.base import Image
 from tracking.frame_rate import DEFAULT_FPS
 from tracking.interpolation import interpolate_gaps
-from tracking.lifecycle.exchanged_ids import ExchangedIds
 from tracking.lifecycle.gating import gate_detections, restrict_network
 from tracking.lifecycle.initiation import Birth, find_births
 from tracking.lifecycle.termination import terminated_ids
@@ -59,7 +58,6 @@ class OnlineTracker:
         self._window = window.resolve(fps)
         self._costs = costs.for_fps(fps)
         self._solver = solver
-        self._exchanged_ids = ExchangedIds(fps, costs.measure, window.exchange_min_gain)
         # For a single object dynamic programming is exact.
         self._single = create_solver("separate-dp")
         self._detections: dict[int, Detections] = {}
@@ -241,10 +239,6 @@ class OnlineTracker:
         occluded_objects[best].restart_at(birth.box, frame)
         return True
 
-    def _fixed_ids(self) -> Collection[int]:
-        """Return ids that are right whatever people look like; subclasses override it."""
-        return ()
-
     def _evict_if_full(self, frame: int, occluded: Collection[int]) -> bool:
         """Remove the longest occluded object if the list is full; return whether there is room.
 
@@ -278,10 +272,8 @@ class OnlineTracker:
         """Make the frames up to `final_to` final: update the objects, and drop long occluded ones."""
         if final_to < first:
             return
-        ended, ids = set[int](), [item.id for item in self._objects]
         for m, detections in enumerate(frames[: final_to - first + 1]):
             column = states[:, m]
-            histograms = dict[int, Floats]()
             assigned = detections.boxes[column[column != OCCLUDED]]
             overlaps = iou(assigned[:, None], assigned[None])
             isolated = iter((np.count_nonzero(overlaps > _MAX_OVERLAP, axis=1) <= 1).tolist())
@@ -292,14 +284,6 @@ class OnlineTracker:
                     item.update(
                         Sighting(first + m, box, histogram, next(isolated)), self._window.template_update_rate
                     )
-                    if histogram.size:
-                        histograms[item.id] = histogram
-            ended |= self._exchanged_ids.update(first + m, self._objects, histograms, self._fixed_ids())
-        if [item.id for item in self._objects] != ids:
-            self._objects = sorted(
-                (item for item in self._objects if item.id not in ended), key=lambda item: item.id
-            )
-            self._warm_start = None
         forget_after = self._window.forget_after
         self._objects = [item for item in self._objects if item.frames_occluded(final_to) <= forget_after]
         self._detections = {n: detections for n, detections in self._detections.items() if n > final_to}

@@ -50,9 +50,6 @@ class WindowSettings:
     max_interpolated_gap_s: float = 0.8  # longest occlusion, in seconds, that is interpolated
     reidentify_after_s: float = 4.0  # seconds of occlusion after which it only returns by re-identification
     reidentify_max_distance: float = 0.35  # largest appearance distance for that, 0 to 1
-    exchange_min_gain: float = (
-        0.1  # appearance distance by which a track must resemble another id more to get it
-    )
 
     def __post_init__(self) -> None:
         if not 0.0 < self.stride_s <= self.length_s:

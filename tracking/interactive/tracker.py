@@ -238,10 +238,6 @@ class CorrectableTracker(OnlineTracker):
         self._network = ids, network
         return network
 
-    def _fixed_ids(self) -> set[int]:
-        """Return the ids that the operator has corrected."""
-        return {number for by_object in self._corrections.values() for number in by_object}
-
     def _assign_id(self, birth: Birth, frame: int) -> int:
         number = self._memory.assign_id(frame, birth.box, self._next_id)
         self._next_id = max(self._next_id, number + 1)

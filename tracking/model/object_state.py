@@ -9,7 +9,6 @@ import numpy as np
 
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.frame_rate import DEFAULT_FPS, frames_in
-from tracking.model.appearance_memory import AppearanceMemory
 from tracking.model.motion import MotionModel
 
 
@@ -77,20 +76,9 @@ class TrackedObject:
         frame: the frame of its last detection.
         is_confirmed: it was detected in a final frame; before that it may be dropped.
         present: it was detected in the last final frame.
-        memory: how its person looks over seconds, to find ids that were exchanged.
     """
 
-    __slots__ = (
-        "_fps",
-        "_history",
-        "box",
-        "frame",
-        "histogram",
-        "id",
-        "is_confirmed",
-        "memory",
-        "present",
-    )
+    __slots__ = ("_fps", "_history", "box", "frame", "histogram", "id", "is_confirmed", "present")
 
     def __init__(
         self,
@@ -109,14 +97,12 @@ class TrackedObject:
         self._history: deque[tuple[int, Floats]] = deque(maxlen=history)
         self.is_confirmed = False
         self.present = False
-        self.memory = AppearanceMemory()
 
     def copy(self) -> TrackedObject:
         """Return a copy."""
         other = TrackedObject(self.id, self.histogram, self.box, self.frame, self._fps)
         other._history.extend(self._history)
         other.is_confirmed, other.present = self.is_confirmed, self.present
-        other.memory = self.memory.copy()
         return other
 
     def template(self, first: int) -> Template:

@@ -146,7 +146,7 @@ def test_a_correction_gives_a_lost_person_the_old_id_back() -> None:
     """Hidden for two seconds and back at an unexpected place: the tracker assigns a new id."""
     strolls = [
         WalkingPerson(0, 50, 2.0, 1, seen=range(30)),
-        WalkingPerson(200, 50, 5.0, 1, seen=range(80, 140)),
+        WalkingPerson(-100, 50, 5.0, 1, seen=range(80, 140)),
     ]
     tracked = _interactive_tracker()
     for n in range(140):
