@@ -35,7 +35,7 @@ log = logging.getLogger(__name__)
 
 
 _GARBAGE_OBJECTS = 50_000
-"""New objects after which cycles among them are looked for; Python's default is 700."""
+"""Allocations beyond deallocations after which cycles are looked for; Python's default is 700."""
 
 
 def collect_garbage_rarely() -> None:

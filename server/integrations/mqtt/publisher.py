@@ -116,6 +116,8 @@ class MqttPublisher:
             await client.subscribe(self._topics.recording_command, _QOS)
         if self._settings.discovery is not None:
             await client.subscribe(f"{self._settings.discovery}/status", _QOS)
+        if self._is_ending:  # the cancellation was lost in one of these
+            return
         try:
             async with asyncio.TaskGroup() as tasks:
                 tasks.create_task(self._receive(client))

@@ -24,7 +24,9 @@ class RunningAssociation:
 
     async def wait(self) -> None:
         """Wait for its end; an error is raised by whoever asks for the numbers."""
-        await asyncio.wait([asyncio.wrap_future(self.numbers)])
+        ended = asyncio.wrap_future(self.numbers)
+        ended.add_done_callback(lambda future: future.cancelled() or future.exception())
+        await asyncio.wait([ended])
 
 
 class AssociationThread:

@@ -95,23 +95,22 @@ class PersonTracker:
         """The last frame of the newest epoch; -1: none."""
         self._thread = AssociationThread()
         self._running: RunningAssociation | None = None
+        self._begun: tuple[int, Sequence[CameraWindow]] = (-1, ())
 
     def update(self, epoch: Epoch) -> Sequence[CameraWindow]:
         """Associate an epoch's tracks, unless that was done; return its windows, late revisions first."""
-        if self.newest != epoch.last:
+        if self._begun[0] != epoch.last:
             self._begin(epoch, run_here)
-        self._finish()
-        return self._windows
+        self.finish_association()
+        return self._begun[1]
 
     async def associate(self, epoch: Epoch) -> None:
-        """Associate an epoch's tracks in a thread; `update` returns the result.
-
-        Whatever changes or asks for identities meanwhile waits for it.
-        """
+        """Associate an epoch's tracks in a thread, for which changes wait; `update` returns the result."""
         await self._begin(epoch, self._thread.run).wait()
 
     def _begin(self, epoch: Epoch, run: Run) -> RunningAssociation:
         """Take an epoch's windows, and begin to associate their tracks."""
+        self.finish_association()
         late = [self._store(window) for window in self._reader.read_late(epoch)]
         windows = [self._store(window) for window in self._reader.read(epoch)]
         own = [window for window in windows if not epoch.is_joint(window.message.camera)]
@@ -122,17 +121,16 @@ class PersonTracker:
             tracks += self._ground.updates(epoch.joint.tracks, [window.message for window in joint])
         since = max(self.newest + 1, epoch.last + 1 - self._recent)  # epochs may have been skipped
         image_sizes = self.undetected.detecting_cameras(windows, since - self._lag, epoch.last - self._lag)
-        self.newest = epoch.last
         association = partial(self._registry.update, tracks, epoch.last - self._lag, image_sizes)
-        self._windows = [*late, *windows]
+        self._begun = (epoch.last, [*late, *windows])
         self._running = RunningAssociation(windows, run(association))
         return self._running
 
-    def _finish(self) -> None:
+    def finish_association(self) -> None:
         """Wait for the end of a running association, and take its result."""
         if self._running is None:
             return
-        running, self._running = self._running, None
+        running, self._running, self.newest = self._running, None, self._begun[0]
         update = self.overrides.apply(running.numbers.result())
         update_parts(self._parts, update.person_ids, self._needed_from)
         self._id_switch_repair.overlay(self._parts)
@@ -169,7 +167,7 @@ class PersonTracker:
 
     def merge(self, kept: int, lost: int) -> None:
         """Merge two people on the operator's command, permanently and regardless of the evidence."""
-        self._finish()
+        self.finish_association()
         is_present = not {kept, lost} <= self.registry.departed
         self.overrides.merge(kept, lost, self.registry.departed)
         self._merge(kept, lost)
@@ -182,7 +180,7 @@ class PersonTracker:
 
         Returns the new number; None: none of the cameras shows the person now.
         """
-        self._finish()
+        self.finish_association()
         shown_by = self._ground.seen_as(cameras)
         tracks = [
             key
@@ -223,7 +221,7 @@ class PersonTracker:
     @property
     def identity(self) -> IdentityRegistry:
         """What is known about each person, by automatic number; waits for an association that runs."""
-        self._finish()
+        self.finish_association()
         return self._registry
 
     def renumber(self, numbers: Mapping[int, int]) -> None:

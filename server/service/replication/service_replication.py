@@ -282,6 +282,7 @@ class ServiceReplication:
 
     def _record(self) -> ServiceRecord:
         assert self._unbroken_since is not None  # noqa: S101 — set by the first epoch
+        self._people.finish_association()  # a service that starts may ask while one runs
         newest = self._people.newest
         snapshots = state_for_cameras(
             self._people,

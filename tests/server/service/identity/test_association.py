@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import threading
 from collections.abc import Callable
 from typing import Any
 
 import pytest
 
 from bestview import IdentityUpdate
+from fakes.service.held_association import hold, release_when_waited_for
 from fakes.service.scripted_cameras import LARGE, SMALL, STRIDE, camera_tracks, epoch_of
 from fakes.service.scripted_identities import boxes, people
 from fakes.timeouts import PATIENCE
@@ -35,31 +35,6 @@ def tracked_people() -> PersonTracker:
         tracker.update(epoch(number))
     tracker.merge(1, 3)
     return tracker
-
-
-def hold(tracker: PersonTracker) -> threading.Event:
-    """Hold the next associations until the event is set."""
-    released, update = threading.Event(), tracker._registry.update
-
-    def held(*args: Any) -> IdentityUpdate:
-        assert released.wait(PATIENCE)
-        return update(*args)
-
-    tracker._registry.update = held  # type: ignore[method-assign]
-    return released
-
-
-def release_when_waited_for(tracker: PersonTracker, released: threading.Event) -> None:
-    """Release the running association as soon as somebody waits for its result."""
-    running = tracker._running
-    assert running is not None
-    result = running.numbers.result
-
-    def waited(timeout: float | None = None) -> IdentityUpdate:
-        released.set()
-        return result(timeout)
-
-    running.numbers.result = waited  # type: ignore[method-assign]
 
 
 def state(tracker: PersonTracker) -> tuple[object, ...]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Iterator, Mapping
 
 import msgspec
 import pytest
 from prometheus_client import CollectorRegistry
 
+from fakes.service.held_association import hold, release_when_waited_for
 from fakes.service.scripted_cameras import (
     CAMERAS,
     FPS,
@@ -16,9 +18,11 @@ from fakes.service.scripted_cameras import (
     STRIDE,
     FedService,
     camera_tracks,
+    epoch_of,
     small_config,
     tracks,
 )
+from fakes.timeouts import PATIENCE
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import Box, ZenohKeys
@@ -286,3 +290,24 @@ async def test_an_invalid_record_is_counted_and_ignored(services: Services, payl
     services.feed(range(10), {A: {1: SMALL}})
     assert services.running[0].replication.bad_messages == 1
     assert services.running[0].replication.leads
+
+
+async def test_a_state_that_is_asked_for_during_an_association_is_that_after_it(services: Services) -> None:
+    services.start(0)
+    services.start(1)
+    services.feed(range(10), {A: {1: SMALL}})
+    service = services.running[0]
+    people = service.decider.people
+    released = hold(people)
+    messages = [camera_tracks(camera, 10, {1: SMALL, 2: LARGE}) for camera in CAMERAS]
+    associating = asyncio.create_task(people.associate(epoch_of(10, *messages)))
+    await asyncio.sleep(0)
+    release_when_waited_for(people, released)
+    state = msgspec.msgpack.decode(service.replication._encoded_state(), type=ServiceState)
+    assert state.record.pulse == end_of_epoch(10, STRIDE)
+    people.update(epoch_of(10, *messages))
+    later = msgspec.msgpack.decode(service.replication._encoded_state(), type=ServiceState)
+    assert later == state
+    assert len(state.record.cameras[B].people) == 2
+    async with asyncio.timeout(PATIENCE):
+        await associating
