@@ -9,18 +9,24 @@ from __future__ import annotations
 
 import contextlib
 import http.client
+import re
 import socket
 import ssl
+import threading
+import time
 import urllib.parse
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 _CONNECT_S = 4.0
 """Seconds for the connection and the answer's head: an RTSP client waits meanwhile."""
+_OPEN_S = 8.0
+"""Seconds for all redirects together."""
 _SILENT_S = 10.0
 """Seconds without a byte after which the service counts as gone: streams have no gaps."""
 _READ_BYTES = 65_536
 _OK = 200
+_UNAUTHORIZED = {401, 403}
 _REDIRECTS = {301, 302, 307, 308}
 _REDIRECTS_MAX = 4
 """In a row: two services may each believe for a moment that the other one has somebody."""
@@ -55,20 +61,23 @@ class Service:
         """
         # In the query, so that a redirect has the token where the other service or site may know it.
         query = "" if token is None else f"?token={urllib.parse.quote(token, safe='')}"
-        url = urllib.parse.urljoin(self.url, path) + query
+        url, until = urllib.parse.urljoin(self.url, path) + query, time.monotonic() + _OPEN_S
         for number in range(_REDIRECTS_MAX + 1):
-            found = self._request(url, is_own=not number)
+            try:
+                found = self._request(url, until, is_own=not number)
+            except StreamRefusedError as error:
+                if number and error.status in _UNAUTHORIZED:
+                    raise ServiceAwayError("it redirects to a service that refuses the token") from None
+                raise
             if isinstance(found, ServiceStream):
                 return found
-            url = urllib.parse.urljoin(url, found)
+            url = _redirected(url, found, path)
         raise ServiceAwayError("it redirects too often")
 
-    def _request(self, url: str, *, is_own: bool) -> ServiceStream | str:
-        """Return a stream, or the address to which the server redirects."""
+    def _request(self, url: str, until: float, *, is_own: bool) -> ServiceStream | str:
+        """Return a stream, or the address to which the server redirects; end at a monotonic time."""
         address = urllib.parse.urlsplit(url)
         is_encrypted = address.scheme == "https"
-        if not is_own and not is_encrypted and self.url.startswith("https:"):
-            raise ServiceAwayError(f"it redirects to {address.hostname}, which does not encrypt")
         # Via: the server's own machine may operate, but what is sent on to other machines may not.
         headers = {"Via": "1.1 myview-rtsp", "User-Agent": "myview-rtsp"}
         connection: http.client.HTTPConnection
@@ -79,14 +88,28 @@ class Service:
                 connection = http.client.HTTPSConnection(host, port, timeout=_CONNECT_S, context=trust)
             else:
                 connection = http.client.HTTPConnection(host, port, timeout=_CONNECT_S)
-        except (OSError, ValueError) as error:  # an address or certificate that is none
+        except (
+            OSError,
+            http.client.InvalidURL,
+            ValueError,
+        ) as error:
             raise ServiceAwayError(str(error)) from error
         try:
-            connection.request("GET", urllib.parse.urlunsplit(("", "", *address[2:4], "")), headers=headers)
-            response = connection.getresponse()
-            connected = connection.sock
-            connected.settimeout(_SILENT_S)
-        except (OSError, http.client.HTTPException, ValueError) as error:  # ValueError: a token of odd bytes
+            connection.connect()
+            connected = connection.sock  # an answer without keep-alive takes it away
+            timer = threading.Timer(max(0.0, until - time.monotonic()), _shut_down, [connected])
+            timer.start()
+            try:
+                target = urllib.parse.urlunsplit(("", "", *address[2:4], ""))
+                connection.request("GET", target, headers=headers)
+                response = connection.getresponse()
+                connected.settimeout(_SILENT_S)
+            finally:
+                timer.cancel()
+        except http.client.InvalidURL:  # its text has the address, with the token
+            connection.close()
+            raise ServiceAwayError("its address is invalid") from None
+        except (OSError, http.client.HTTPException, ValueError) as error:
             connection.close()
             raise ServiceAwayError(str(error) or type(error).__name__) from error
         if response.status != _OK:
@@ -112,6 +135,33 @@ class Service:
             trust.load_verify_locations(self.certificate)
             trust.verify_flags |= ssl.VERIFY_X509_PARTIAL_CHAIN
         return trust
+
+
+def _redirected(url: str, location: str, path: str) -> str:
+    """Return the address of a redirect, to the stream that was asked for; a person may have another number.
+
+    Raises:
+        ServiceAwayError: it leads elsewhere: a foreign site must not make the gateway ask anybody else.
+    """
+    try:
+        found = urllib.parse.urljoin(url, location)
+        before, after = urllib.parse.urlsplit(url), urllib.parse.urlsplit(found)
+        host, is_valid = after.hostname, after.port != 0 and all("!" <= each <= "~" for each in found)
+    except ValueError:
+        host, is_valid = None, False
+    if not is_valid:
+        raise ServiceAwayError("it redirects to an invalid address")
+    pattern = re.sub(r"(?<=/objects/)\d+", r"\\d+", re.escape(path))
+    if after.scheme not in {"http", "https"} or not host or not re.search(f"{pattern}$", after.path):
+        raise ServiceAwayError("it redirects to what is not this stream")
+    if before.scheme == "https" and after.scheme == "http":
+        raise ServiceAwayError(f"it redirects to {host}, which does not encrypt")
+    return found
+
+
+def _shut_down(connected: socket.socket) -> None:
+    with contextlib.suppress(OSError):
+        connected.shutdown(socket.SHUT_RDWR)
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,5 +192,4 @@ class ServiceStream:
 
     def close(self) -> None:
         """End it, from any thread."""
-        with contextlib.suppress(OSError):
-            self._socket.shutdown(socket.SHUT_RDWR)
+        _shut_down(self._socket)
