@@ -94,16 +94,24 @@ def carry(
         ]
         after = [_Metrics.read(service.url) for service in running]
         memory = sum(_resident(service.process.pid) for service in running) / services
-    loads = [_load(hall, fps, start, stop, memory) for start, stop in zip(starts, stops, strict=True)]
-    stages = {name: sum(load.stages[name] for load in loads) / services for name in loads[0].stages}
     since = list(zip(before, after, strict=True))
     late = sum(new.late - old.late for old, new in since)
     lag = max(new.lag_since(old) for old, new in since)
-    return replace(loads[0], services=services, stages=stages, late=late, lag=lag)
+    loads = [
+        _load(hall, fps, start, stop, memory, late, lag) for start, stop in zip(starts, stops, strict=True)
+    ]
+    stages = {name: sum(load.stages[name] for load in loads) / services for name in loads[0].stages}
+    return replace(loads[0], services=services, stages=stages)
 
 
 def _load(
-    hall: SimulatedHall, fps: float, start: ServiceTimes, stop: ServiceTimes, memory: float
+    hall: SimulatedHall,
+    fps: float,
+    start: ServiceTimes,
+    stop: ServiceTimes,
+    memory: float,
+    late: int,
+    lag: float,
 ) -> SiteLoad:
     frames = STRIDE * (stop.epochs - start.epochs)
     stages = {name: 1e3 * (stop.seconds[name] - start.seconds[name]) / frames for name in STAGES}
@@ -120,8 +128,8 @@ def _load(
         messages=FPS * (stop.messages - start.messages) / frames,
         megabytes=FPS * (stop.size - start.size) / frames / 1e6,
         memory=memory,
-        late=0,
-        lag=0.0,
+        late=late,
+        lag=lag,
         epochs=stop.epochs - start.epochs,
     )
 

@@ -88,11 +88,7 @@ class Service:
                 connection = http.client.HTTPSConnection(host, port, timeout=_CONNECT_S, context=trust)
             else:
                 connection = http.client.HTTPConnection(host, port, timeout=_CONNECT_S)
-        except (
-            OSError,
-            http.client.InvalidURL,
-            ValueError,
-        ) as error:
+        except (OSError, http.client.HTTPException, ValueError) as error:
             raise ServiceAwayError(str(error)) from error
         try:
             connection.connect()
@@ -106,12 +102,15 @@ class Service:
                 connected.settimeout(_SILENT_S)
             finally:
                 timer.cancel()
-        except http.client.InvalidURL:  # its text has the address, with the token
-            connection.close()
-            raise ServiceAwayError("its address is invalid") from None
-        except (OSError, http.client.HTTPException, ValueError) as error:
+        except OSError as error:
             connection.close()
             raise ServiceAwayError(str(error) or type(error).__name__) from error
+        except (
+            http.client.HTTPException,
+            ValueError,
+        ) as error:  # the text may have the address, with the token
+            connection.close()
+            raise ServiceAwayError(f"it does not answer by HTTP ({type(error).__name__})") from None
         if response.status != _OK:
             location = response.getheader("Location")
             response.close()

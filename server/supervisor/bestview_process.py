@@ -39,11 +39,7 @@ _GARBAGE_OBJECTS = 50_000
 
 
 def collect_garbage_rarely() -> None:
-    """Let Python look for cycles every few epochs instead of hundreds of times in each.
-
-    An epoch of a hundred cameras makes a hundred thousand objects, none of them in cycles; looking takes a
-    fifth of the service's time.
-    """
+    """Look for cycles more rarely: with a hundred cameras it takes a fifth of the service's time."""
     gc.set_threshold(_GARBAGE_OBJECTS)
 
 

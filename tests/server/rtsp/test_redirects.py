@@ -89,6 +89,12 @@ def test_a_person_is_followed_under_another_number_to_a_server_without_keep_aliv
     assert list(Service(here).open(PATH, None).blocks()) == [b"film"]
 
 
+def test_an_answer_that_repeats_the_request_does_not_put_the_token_into_the_error(serve: Serve) -> None:
+    with pytest.raises(ServiceAwayError) as raised:
+        Service(serve(lambda target: f"GET {target} HTTP/1.1\r\n\r\n".encode())).open(PATH, TOKEN)
+    assert TOKEN not in str(raised.value)
+
+
 def test_a_token_that_only_another_service_refuses_is_not_wrong(serve: Serve) -> None:
     there = serve(refuse)
     with pytest.raises(ServiceAwayError, match="refuses the token"):
