@@ -166,7 +166,7 @@ class PersonTile {
   #paint({ mediaTime, image }) {
     const { site, decisions, boxesOn } = this.context;
     this.#mediaTime = mediaTime;
-    if (site && boxesOn && !this.player.switching) {
+    if (site && boxesOn && !this.player.isSwitching(mediaTime)) {
       const pulse = Math.round(this.player.mediaTime(mediaTime) * site.fps); // NaN: unknown
       const camera = decisions.camera(this.object, pulse);
       this.overlay.draw(camera === null ? [] : decisions.boxes(camera, pulse), this.object, site, image, null);

@@ -35,7 +35,7 @@ export class HlsPlayer {
   constructor(video, listener) {
     this.video = video;
     this.listener = listener;
-    this.#playback = new Playback(video, () => this.shown && !this.switching && listener.resumed());
+    this.#playback = new Playback(video, () => this.shown && !this.isSwitching() && listener.resumed());
     video.addEventListener('loadeddata', () => this.#loaded());
     video.addEventListener('ended', () => this.#ended());
     video.addEventListener('error', () => this.#fail());
@@ -68,7 +68,7 @@ export class HlsPlayer {
   }
 
   /** @returns {boolean} whether the element may still display the previous selection */
-  get switching() {
+  isSwitching() {
     return this.#selection !== null && this.#selection !== this.shown;
   }
 

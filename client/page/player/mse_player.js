@@ -9,7 +9,7 @@ import { Backoff } from '../shared/backoff.js';
 import { afterSeek } from './frames.js';
 import { Playback } from './playback.js';
 import { pause } from '../shared/requests.js';
-import { hasRestarted, switchTime } from './stream_switch.js';
+import { hasRestarted, mayBelongTo, switchTime } from './stream_switch.js';
 import { concat } from './media/mp4.js';
 import { canPlay, openMediaSource } from './media/media_source.js';
 import { LatencyController } from './latency_control.js';
@@ -202,9 +202,12 @@ export class MsePlayer {
     return time;
   }
 
-  /** @returns {boolean} whether the element may still display the previous selection */
-  get switching() {
-    return this.#switchingTo !== null;
+  /**
+   * @param {number} time of a frame, as the browser reports it
+   * @returns {boolean} whether the frame may be of another selection than `shown`
+   */
+  isSwitching(time) {
+    return this.#switchingTo !== null || (this.#download !== null && mayBelongTo(this.#download, time));
   }
 
   /** @param {StreamDownload} download */

@@ -21,7 +21,7 @@ export class Painter {
     this.viewer = viewer;
     this.overlay = overlay;
     watchFrames(video, () => this.#painting, (frame) => {
-      if (viewer.player.switching) return frame.image?.close(); // repainted when the switch is complete
+      if (viewer.player.isSwitching(frame.mediaTime)) return frame.image?.close(); // repainted when the switch is complete
       viewer.currentFrame.update(frame);
       this.#paint(frame.image);
       onFrame();
@@ -34,8 +34,9 @@ export class Painter {
   /** Paint the current frame again after a change of selection, boxes or size. */
   repaint() {
     const { video, viewer } = this;
-    if (viewer.probe.pulse === null || viewer.player.switching) return;
+    if (viewer.probe.pulse === null) return;
     const frame = captureFrame(video, viewer.currentFrame.mediaTime, this.#painting);
+    if (viewer.player.isSwitching(frame.mediaTime)) return frame.image?.close();
     if (frame.image) viewer.currentFrame.update({ ...frame, shownAt: Date.now() });
     this.#paint(frame.image);
   }

@@ -20,6 +20,15 @@ export function hasRestarted(start, time, gopS) {
 }
 
 /**
+ * @param {StreamDownload} stream being buffered over the displayed one
+ * @param {number} time media time of a displayed frame
+ * @returns {boolean} whether the frame may be the new stream's: playback may run into it before the seek
+ */
+export function mayBelongTo({ start, onScreen }, time) {
+  return !onScreen && time >= start - INSIDE_S;
+}
+
+/**
  * @param {StreamDownload} stream with frames in the buffer
  * @param {number} end media time up to which it is buffered
  * @param {number} time displayed media time

@@ -39,7 +39,7 @@ export class WebRtcPlayer {
   constructor(video, listener) {
     this.video = video;
     this.listener = listener;
-    this.#playback = new Playback(video, () => this.shown && !this.switching && listener.resumed());
+    this.#playback = new Playback(video, () => this.shown && !this.isSwitching() && listener.resumed());
     video.addEventListener('loadeddata', () => this.#loaded());
   }
 
@@ -64,7 +64,7 @@ export class WebRtcPlayer {
   }
 
   /** @returns {boolean} whether the element may still display the previous selection */
-  get switching() {
+  isSwitching() {
     return this.#selection !== null && this.#selection !== this.shown;
   }
 

@@ -149,7 +149,7 @@ export class Pointing {
   /** @param {StagePoint} point in the displayed frame */
   #addCorrection({ x, y, tolerance }) {
     const { site, probe, currentFrame, player } = this.viewer;
-    if (this.object === null || !site || !currentFrame.mapped || player.switching) return;
+    if (this.object === null || !site || !currentFrame.mapped || player.isSwitching(currentFrame.mediaTime)) return;
     if (probe.pulse === null || probe.camera === null) return;
     const { scale, ...point } = this.overlay.toPicture(x, y, site);
     if (!(point.x >= 0 && point.x <= site.width && point.y >= 0 && point.y <= site.height)) return;

@@ -3,7 +3,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 
-import { hasRestarted, switchTime } from '../../../../client/page/player/stream_switch.js';
+import { hasRestarted, mayBelongTo, switchTime } from '../../../../client/page/player/stream_switch.js';
 import { StreamDownload } from '../../../../client/page/player/media/stream_download.js';
 
 const SELECTION = { object: 1, camera: null, prefer: null, past: null };
@@ -44,6 +44,14 @@ test('a stream ahead of the displayed time, or with restarted pulses, is joined 
 test('a stream that is later for good is joined at its start at once', () => {
   const time = switchTime(stream({ start: 10 }), 10.4, 12, 0) ?? NaN;
   assert.ok(time >= 10 && time < 10 + TOLERANCE_S);
+});
+
+test('a frame from where the new stream starts may be its own until the element has switched', () => {
+  const next = stream({ start: 10 });
+  assert.ok(mayBelongTo(next, 10) && mayBelongTo(next, 10.2));
+  assert.ok(!mayBelongTo(next, 9.96), 'the stream on the screen');
+  assert.ok(!mayBelongTo(stream({ start: NaN }), 10), 'nothing was received yet');
+  assert.ok(!mayBelongTo(Object.assign(next, { onScreen: true }), 10.2));
 });
 
 test('a past stream is joined at the requested time once that is buffered', () => {
