@@ -24,9 +24,9 @@ test: $(STAMP) node_modules
 test-slow: $(STAMP) node_modules
 	$(BIN)/python tests/suite.py --slow $(SUITE)
 
-# Finds tests that are flaky or fail on a loaded machine: two hours on two cores.
+# Finds tests that are flaky or fail on a loaded machine: three hours on two cores.
 test-loaded: $(STAMP) node_modules
-	$(BIN)/python tests/suite.py --runs 20 --at-once 5 $(SUITE)
+	$(BIN)/python tests/suite.py --runs 20 --at-once 2 $(SUITE)
 
 lint: $(STAMP) node_modules
 	$(BIN)/ruff check .

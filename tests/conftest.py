@@ -19,6 +19,8 @@ _SITES = "tests/e2e/"
 
 _REAL_TIME_FOLDERS = (_SITES, "tests/client/page/", "tests/server/http/operator/", "tests/server/setup/")
 """Folders whose tests mostly wait."""
+_REAL_TIME_WORKERS = 3
+"""At most so many workers run tests that mostly wait: the others keep the processors busy meanwhile."""
 
 # No deadline per example, since that depends on the machine; a hanging test hits its timeout.
 # All runs try the same examples, so that no run fails by chance; `make test-slow` tries others, and more.
@@ -53,7 +55,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Start with sites and browsers: they take longest, and others have the processor while they wait."""
+    """Start with sites and browsers, which take longest."""
     items.sort(key=lambda item: [not item.nodeid.startswith(folder) for folder in _REAL_TIME_FOLDERS])
 
 
@@ -63,6 +65,21 @@ class _RealTimeScheduling(LoadFileScheduling):
     def _split_scope(self, nodeid: str) -> str:
         file: str = super()._split_scope(nodeid)
         return _SITES if file.startswith(_SITES) else file
+
+    def _assign_work_unit(self, node: Any) -> None:
+        waiting = sum(
+            any(_is_real_time(scope) and not all(tests.values()) for scope, tests in files.items())
+            for other, files in self.assigned_work.items()
+            if other is not node
+        )
+        other_file = next((scope for scope in self.workqueue if not _is_real_time(scope)), None)
+        if waiting >= _REAL_TIME_WORKERS and other_file is not None:
+            self.workqueue.move_to_end(other_file, last=False)
+        super()._assign_work_unit(node)
+
+
+def _is_real_time(name: str) -> bool:
+    return name.startswith(_REAL_TIME_FOLDERS)
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -1,7 +1,7 @@
 """Run the whole suite part by part, and print one summary: ``make test``.
 
-All parts run, even after failures. The last line has the format of pytest. ``--runs 20 --at-once 5`` runs
-everything twenty times, five runs in parallel: `make test-loaded` checks that no test fails under load.
+All parts run, even after failures. The last line has the format of pytest. ``--runs 20 --at-once 2`` runs
+everything twenty times, two runs in parallel: `make test-loaded` checks that no test fails under load.
 """
 
 from __future__ import annotations
