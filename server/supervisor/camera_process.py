@@ -25,6 +25,8 @@ from server.system.errors import UnavailableError, UserError
 log = logging.getLogger(__name__)
 
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
+_STABLE_S = 10.0
+"""Running time after which a camera is opened again with the shortest delay."""
 
 
 async def camera_process(running: ActiveConfig, camera_id: str) -> None:
@@ -41,11 +43,12 @@ async def camera_process(running: ActiveConfig, camera_id: str) -> None:
         signal_started()  # opening it mostly waits for a network or device, so others may start meanwhile
     restart = asyncio.Event()
     reload_task = asyncio.create_task(_follow(running, camera_id, restart), name="reload")
+    attempts = _Attempts(camera_id, restart)
     try:
-        camera = await _create(running, camera_id, restart, started=False)
+        camera = await _create(running, camera_id, attempts, started=False)
         signal_started()
-        while not await _run(camera, camera_id, restart):
-            camera = await _create(running, camera_id, restart, started=True)
+        while not await _run(camera, attempts):
+            camera = await _create(running, camera_id, attempts, started=True)
     except SyncError as error:
         raise UnavailableError(f"camera {camera_id}: {error}") from error
     finally:
@@ -53,52 +56,83 @@ async def camera_process(running: ActiveConfig, camera_id: str) -> None:
         await asyncio.gather(reload_task, return_exceptions=True)
 
 
+class _Attempts:
+    """Spaces the attempts to use a camera, and throttles the log lines of those that fail.
+
+    A camera may also be opened each time and fail soon after. ``restart`` is set when the settings change.
+    """
+
+    def __init__(self, camera_id: str, restart: asyncio.Event) -> None:
+        self._id, self.restart = camera_id, restart
+        self._failures, self._changes = LogThrottle(quiet_s=0.0), LogThrottle()
+        self._backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
+
+    async def failed(self, error: UserError) -> None:
+        """Record that the camera cannot be opened, and wait before the next attempt."""
+        if (more := self._failures.record(str(error))) is not None:
+            log.warning("%s%s; retrying", error, more)
+        await self._wait()
+
+    def opened(self) -> None:
+        """Record that it has been opened."""
+        if ended := self._failures.end():
+            log.info("camera %s is available, after %.0f s", self._id, ended.seconds)
+
+    async def changed(self, error: UnavailableError, ran_s: float) -> None:
+        """Record that it must be opened again after some seconds, and wait before that."""
+        if ran_s >= _STABLE_S:
+            self._backoff.reset()
+        if (more := self._changes.record(str(error))) is not None:
+            log.warning("camera %s: %s%s; opening it again", self._id, error, more)
+        await self._wait()
+
+    async def _wait(self) -> None:
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self.restart.wait(), self._backoff.next())
+
+
 async def _create(
-    running: ActiveConfig, camera_id: str, restart: asyncio.Event, *, started: bool
+    running: ActiveConfig, camera_id: str, attempts: _Attempts, *, started: bool
 ) -> CameraProcess:
     """Create the camera when its source can be opened, with the active settings.
 
-    The process keeps running meanwhile: a new one would load all libraries again. ``restart`` is set when the
-    settings change. ``started``: the site has started, so an error of this camera must not end it.
+    The process keeps running meanwhile: a new one would load all libraries again. ``started``: the site has
+    started, so an error of this camera must not end it.
     """
-    failures, backoff = LogThrottle(quiet_s=0.0), Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
     with contextlib.closing(UnavailabilityReport(running.now, camera_id)) as report:
         while True:
-            restart.clear()
+            attempts.restart.clear()
             try:
                 camera = await asyncio.to_thread(_open, running.now, camera_id)
             except UserError as error:
                 if not (started or isinstance(error, UnavailableError)):
                     raise
-                if (more := failures.record(str(error))) is not None:
-                    log.warning("%s%s; retrying", error, more)
                 report.send(str(error))
                 started = True
+                await attempts.failed(error)
             else:
-                if ended := failures.end():
-                    log.info("camera %s is available, after %.0f s", camera_id, ended.seconds)
+                attempts.opened()
                 return camera
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(restart.wait(), backoff.next())
 
 
 def _open(config: Config, camera_id: str) -> CameraProcess:
     return CameraProcess(fill_in_password(add_joint_homographies(config), camera_id), camera_id)
 
 
-async def _run(camera: CameraProcess, camera_id: str, restart: asyncio.Event) -> bool:
+async def _run(camera: CameraProcess, attempts: _Attempts) -> bool:
     """Run until the recording is over (return True) or the camera has to be opened again (return False)."""
-    run, waiting = asyncio.create_task(camera.run()), asyncio.create_task(restart.wait())
+    loop = asyncio.get_running_loop()
+    began = loop.time()
+    run, waiting = asyncio.create_task(camera.run()), asyncio.create_task(attempts.restart.wait())
     try:
         await asyncio.wait({run, waiting}, return_when=asyncio.FIRST_COMPLETED)
         if run.done():
             run.result()
         return run.done()
     except UnavailableError as error:  # what the camera sends has changed
-        log.warning("camera %s: %s; opening it again", camera_id, error)
+        await attempts.changed(error, loop.time() - began)
         return False
     finally:
-        restart.clear()
         for task in (run, waiting):
             task.cancel()
         await asyncio.gather(run, waiting, return_exceptions=True)

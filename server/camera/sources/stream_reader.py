@@ -24,6 +24,8 @@ log = logging.getLogger(__name__)
 OPEN_S, READ_S = 10.0, 5.0
 """Timeouts of connecting and of reading, in seconds."""
 _RETRY_FIRST_S, _RETRY_MAX_S = 0.5, 10.0
+_STABLE_S = 3.0
+"""How long frames must have arrived for the next absence to begin with the shortest delay again."""
 _JOIN_S = 0.5
 
 
@@ -91,11 +93,12 @@ class StreamReader:
             return None
 
     def _read(self, opened: OpenedVideo) -> bool:
-        """Read until the connection ends; return whether any frame was decoded."""
+        """Read until the connection ends; return whether frames have arrived for some time."""
         if not self._accept(opened):
             opened.container.close()
             return False
-        has_frames, reason = False, "the connection has ended"
+        first_at: float | None = None
+        last_at, reason = 0.0, "the connection has ended"
         self._clock = StreamClock()
         try:
             for packet in opened.container.demux(opened.stream, *self._audio_streams(opened)):
@@ -103,9 +106,9 @@ class StreamReader:
                     break
                 if packet.stream is opened.stream:
                     video = cast("av.Packet[VideoStream]", packet)
-                    self._clock.observe(video, time.monotonic())
+                    self._clock.observe(video, now := time.monotonic())
                     if self._decode(video):
-                        has_frames = True
+                        first_at, last_at = now if first_at is None else first_at, now
                         self._log_recovered()
                 else:
                     self._hear(cast("av.Packet[AudioStream]", packet))
@@ -117,7 +120,7 @@ class StreamReader:
             opened.container.close()
         if not self._closing.is_set():
             self._log_away(f"{redact_to_host(self._url)}: {reason}")
-        return has_frames
+        return first_at is not None and last_at - first_at >= _STABLE_S
 
     def _log_away(self, reason: str, *, unexpected: bool = False) -> None:
         """Log that the camera is away; throttled, as it may come and go."""

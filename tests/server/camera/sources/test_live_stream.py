@@ -20,6 +20,7 @@ from av.audio.stream import AudioStream
 from av.video.frame import VideoFrame
 from av.video.stream import VideoStream
 
+from expbackoff import Backoff
 from fakes.media.videos import HEIGHT, STEP, WIDTH, frame_in, write_video
 from fakes.timeouts import PATIENCE
 from server.camera.audio import LiveAudioSource
@@ -35,6 +36,8 @@ class MotionJpeg:
 
     def __init__(self) -> None:
         self.frame, self.width = 0, WIDTH
+        self.parts: int | None = None
+        """After how many pictures it ends a connection."""
         self._unplugged = threading.Event()
         self._server: http.server.ThreadingHTTPServer | None = None
         self._thread: threading.Thread | None = None
@@ -47,7 +50,9 @@ class MotionJpeg:
                 self.send_response(200)
                 self.send_header("Content-Type", "multipart/x-mixed-replace; boundary=frame")
                 self.end_headers()
-                while not unplugged.wait(0.02):
+                sent = 0
+                while sent != camera.parts and not unplugged.wait(0.02):
+                    sent += 1
                     grey = np.full((HEIGHT, camera.width, 3), STEP * camera.frame, np.uint8)
                     jpeg = cv2.imencode(".jpg", grey)[1].tobytes()
                     part = b"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: %d\r\n\r\n" % len(jpeg)
@@ -148,6 +153,37 @@ def test_a_long_absence_is_logged_once_and_so_is_the_return(
     assert len(reasons) == len(set(reasons)) <= 3, "once for each reason, not for each attempt"
     assert back.getMessage().startswith(f"http://127.0.0.1:{port}/...: frames arrive again, after ")
     assert not [message for message in caplog.messages if "hunter2" in message]
+
+
+@pytest.mark.parametrize(("stable_s", "delays"), [(3.0, [0.5, 1.0, 2.0, 4.0]), (0.0, [0.5] * 4)])
+def test_a_camera_that_ends_soon_again_and_again_is_connected_to_less_and_less_often(
+    camera: MotionJpeg,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    stable_s: float,
+    delays: list[float],
+) -> None:
+    """One that has worked for some time begins with the shortest delay again."""
+    caplog.set_level("INFO", "server.camera.sources")
+    waited: list[float] = []
+
+    class Recorded(Backoff):
+        def next(self) -> float:
+            waited.append(super().next())
+            return 0.01
+
+    monkeypatch.setattr(stream_reader, "Backoff", Recorded)
+    monkeypatch.setattr(stream_reader, "_STABLE_S", stable_s)
+    camera.parts = 5
+    source = LiveStream(f"http://127.0.0.1:{camera.plug_in()}/", {})
+    try:
+        until(lambda: len(waited) > len(delays))
+    finally:
+        source.close()
+    assert waited[: len(delays)] == delays
+    away, back = caplog.messages
+    assert away.endswith("; retrying")
+    assert "frames arrive again" in back
 
 
 class PausingCamera:
