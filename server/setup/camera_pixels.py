@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from server.config.sections.rules import PICTURE_MARGIN
 from server.service.calibration.points_file import parse_points
 from server.setup.site_pixels import Size, has_same_shape
 from server.setup.yaml_edit import plain_numbers
@@ -83,8 +84,9 @@ def _scaled(entry: Mapping[str, Any], factors: NDArray[np.float64]) -> dict[str,
             changed[key] = _moved(entry[key], factors)
     if entry.get("ignore"):
         changed["ignore"] = [_moved(area, factors) for area in entry["ignore"]]
-    if entry.get("margin") is not None:
-        changed["margin"] = plain_numbers(round(float(entry["margin"] * factors.mean()), _DIGITS))
+    if "camera" in entry:  # a zone, whose margin is a default unless it is written
+        margin = PICTURE_MARGIN if entry.get("margin") is None else float(entry["margin"])
+        changed["margin"] = plain_numbers(round(float(margin * factors.mean()), _DIGITS))
     if entry.get("ground") is not None:
         changed["ground"] = _homography(entry["ground"], factors)
     return changed

@@ -18,7 +18,7 @@ Day = Literal["mon", "tue", "wed", "thu", "fri", "sat", "sun"]
 
 _CORNERS_MAX = 100
 _MINUTES_OF_DAY = 24 * 60
-_FLOOR_MARGIN, _PICTURE_MARGIN = 0.2, 8.0
+_FLOOR_MARGIN, PICTURE_MARGIN = 0.2, 8.0
 
 
 def _clock(value: Any) -> Any:
@@ -75,7 +75,7 @@ class ZoneSettings(Section):
         """The margin in force."""
         if self.margin is not None:
             return self.margin
-        return _FLOOR_MARGIN if self.camera is None else _PICTURE_MARGIN
+        return _FLOOR_MARGIN if self.camera is None else PICTURE_MARGIN
 
 
 def _is_flat(points: Sequence[Point]) -> bool:

@@ -70,6 +70,7 @@ def test_what_is_in_pixels_of_the_camera_is_scaled_with_its_picture_and_nothing_
     till, gate, *others = after.zones
     assert (till.area, till.margin) == ([(0, 0), (180, 0), (180, 80)], 24)
     assert (gate.line, gate.inner) == ([(0, 20), (180, 20)], (90, 60))
+    assert gate.border_margin == 2 * before.zones[1].border_margin, "the default is in pixels, too"
     assert others == list(before.zones[2:])
 
 
