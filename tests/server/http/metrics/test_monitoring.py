@@ -13,7 +13,7 @@ from fakes.prometheus.monitoring_files import (
     SCRAPING,
     VARIABLES,
 )
-from fakes.prometheus.promql_series import ExportedMetrics, select_series, selectors
+from fakes.prometheus.promql_series import ExportedMetrics, firing_series, select_series, selectors
 from fakes.service.fed_site import ServedSite
 from fakes.service.scripted_cameras import CAMERAS, camera_tracks, status, tracks
 from server.config.sections import LinkSettings
@@ -83,6 +83,7 @@ h_bucket{camera="c0",le="+Inf"} 1
         ("c == 0", []),
         ('b{camera="c7"}', []),
         ("sum by (camera) (rate(a_total[5m])) / b", [{"camera": "c1"}]),
+        ('b and ignoring (of) a_total{of="video"} > 0', [{"camera": "c1"}]),
         ("rate(a_total[5m]) / b", []),
         ("histogram_quantile(0.5, sum by (le) (rate(h_bucket[5m])))", [{}]),
         ("histogram_quantile(0.5, rate(h_bucket[5m]))", [{"camera": "c0"}]),
@@ -107,6 +108,34 @@ def test_the_evaluator_yields_known_results(expression: str, series: list[dict[s
 def test_the_evaluator_reports_invalid_expressions(expression: str, error: str) -> None:
     with pytest.raises(ValueError, match=error):
         select_series(expression, ExportedMetrics.of(SAID))
+
+
+@pytest.mark.parametrize(
+    ("condition", "covered_share", "alerts"),
+    [
+        ("clear", 0.0, []),
+        ("clear", 0.3, ["MyViewCameraPartlyCovered"]),
+        ("covered", 0.6, ["MyViewCameraPicture"]),
+        ("covered", 1.0, ["MyViewCameraPicture"]),
+    ],
+)
+async def test_a_covered_lens_fires_one_alert(
+    site_with_people: ServedSite, condition: str, covered_share: float, alerts: list[str]
+) -> None:
+    site_with_people.service.ingest.status(
+        status(CAMERAS[0], condition=condition, covered_share=covered_share)
+    )
+    site_with_people.service.ingest.status(status(CAMERAS[1]))
+    async with site_with_people.session.get("/metrics") as answer:
+        metrics = ExportedMetrics.of(await answer.text())
+    firing = {
+        alert["alert"]: [dict(labels)["camera"] for labels in firing_series(alert["expr"], metrics)]
+        for alert in ALERTS
+        if alert["alert"] in {"MyViewCameraPicture", "MyViewCameraPartlyCovered"}
+    }
+    assert {name: cameras for name, cameras in firing.items() if cameras} == {
+        name: [CAMERAS[0]] for name in alerts
+    }
 
 
 def test_every_alert_has_a_severity_and_a_unique_name() -> None:
