@@ -14,7 +14,14 @@ from server.setup.camera_address import check_name, free_name
 from server.setup.camera_pixels import CameraPixels, follow_size
 from server.setup.ground import read_ground
 from server.setup.session import TriedCamera
-from server.setup.site_file import camera_entry, check_text, password_file, replace_file, write_passwords
+from server.setup.site_file import (
+    camera_entry,
+    check_text,
+    password_file,
+    replace_file,
+    with_sent,
+    write_passwords,
+)
 from server.setup.site_pixels import Size
 from server.setup.yaml_edit import changed_lists_text
 from server.system.address_redaction import redact_to_host
@@ -117,8 +124,11 @@ def readdress_camera(
     )
     before = sizes.get(load_config(path).camera(camera_id).source)
     changed = follow_size(present, before, (tried.trial.width, tried.trial.height))
-    lists = {"cameras": [changed.entry if camera is earlier else camera for camera in cameras]}
-    text = _checked_text(path, lists | ({"zones": changed.zones} if changed.zones != zones else {}))
+    lists: dict[str, Sequence[Mapping[str, Any]]] = {
+        "cameras": [changed.entry if camera is earlier else camera for camera in cameras]
+    }
+    lists |= {"zones": changed.zones} if changed.zones != zones else {}
+    text = with_sent(_checked_text(path, lists), new)
     write_passwords([new], path)
     if ground is None or changed.ground == ground.content:
         replace_file(text, path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime as dt
 import os
+import re
 import stat
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -148,6 +149,13 @@ def _camera_text(camera: NewCamera, path: Path) -> str:
     elif camera.own_video.wanted:
         lines += _PASSED_IF.format(wanted=camera.own_video.wanted)
     return lines
+
+
+def with_sent(text: str, camera: NewCamera) -> str:
+    """Return a text with what a camera sends now beside its source, if set-up has written that there."""
+    source = re.escape(_scalar(camera.address.source))
+    written = rf"(?m)^(.*\bsource: {source} +# )\S+ \d+x\d+(, \S+ fps)?$"
+    return re.sub(written, lambda match: f"{match[1]}{camera.sends}", text)
 
 
 def _scalar(text: str) -> str:

@@ -35,8 +35,8 @@ def changed_text(path: Path, section: str, value: Any) -> str:
 def changed_lists_text(path: Path, lists: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
     """Return the text of a configuration file with other entries in some lists, each entry with an id.
 
-    Entries that stay the same keep their text, those that change the comments above them; a changed one is
-    one line in flow style. Otherwise as :func:`changed_text`.
+    Entries keep their text and comments, except the values that change. One in flow style, or that cannot be
+    changed in its place, becomes one line. Otherwise as :func:`changed_text`.
 
     Raises:
         UserError: the file cannot be read, or is not valid YAML.
@@ -90,9 +90,7 @@ def _with_value(text: str, place: Sequence[str], value: Any) -> str:
         node = next((inner for key, inner in pairs if key.value == name), None)
     if node is None:
         return text
-    start, end = node.start_mark.index, node.end_mark.index
-    space = " " if start == end else ""  # there is no value
-    return f"{text[:start]}{space}{dump_yaml_inline(value)}{text[end:]}"
+    return _with_node(text, node, value)
 
 
 def _merged(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
@@ -189,9 +187,55 @@ def _list_text(
         if found is None and len(old) == len(entries) and replaced:
             found = replaced.pop(0)
         above = "" if found is None else found.above
-        same = found is not None and found.content == entry
-        parts.append(above + (found.lines if found and same else f"{indent}- {dump_yaml_inline(entry)}\n"))
+        lines_of_entry = None if found is None else _entry_lines(found, entry)
+        parts.append(above + (lines_of_entry or f"{indent}- {dump_yaml_inline(entry)}\n"))
     return "".join(parts)
+
+
+def _entry_lines(found: _EntryText, wanted: Mapping[str, Any]) -> str | None:
+    """Return the lines of an entry with other values in their places; None: they cannot be told apart."""
+    if found.content == wanted:
+        return found.lines
+    with contextlib.suppress(yaml.YAMLError):
+        root = yaml.compose(found.lines, Loader=yaml.SafeLoader)
+        if isinstance(root, yaml.SequenceNode) and isinstance(root.value[0], yaml.MappingNode):
+            changed = _with_pairs(found, root.value[0], wanted)
+            if yaml.safe_load(changed) == [wanted]:
+                return changed
+    return None
+
+
+def _with_pairs(found: _EntryText, node: yaml.MappingNode, wanted: Mapping[str, Any]) -> str:
+    text = found.lines
+    if node.flow_style:
+        return _with_node(text, node, wanted)
+    pairs = {key.value: (key, value) for key, value in node.value}
+    for name, (key, value) in reversed(pairs.items()):
+        if name not in wanted:
+            after = text.find("\n", _content_end(text, value)) + 1
+            text = text[: key.start_mark.index - key.start_mark.column] + text[after:]
+        elif wanted[name] != found.content[name]:
+            text = _with_node(text, value, wanted[name])
+    indent = " " * node.start_mark.column
+    new = (
+        f"{indent}{name}: {dump_yaml_inline(value)}\n" for name, value in wanted.items() if name not in pairs
+    )
+    return text + "".join(new)
+
+
+def _with_node(text: str, node: yaml.Node, value: Any) -> str:
+    start, end = node.start_mark.index, _content_end(text, node)
+    space = " " if start == end else ""  # there is no value
+    return f"{text[:start]}{space}{dump_yaml_inline(value)}{text[end:]}"
+
+
+def _content_end(text: str, node: yaml.Node) -> int:
+    """Return where a node's text ends; one in block style takes in the lines until the next key."""
+    start = node.start_mark.index
+    lines = text[start : node.end_mark.index].splitlines(keepends=True)
+    while lines and not _is_content(lines[-1]):
+        lines.pop()
+    return start + len("".join(lines).rstrip())
 
 
 def _entry_texts(

@@ -128,6 +128,46 @@ def test_a_camera_gets_another_address_and_keeps_its_settings_and_the_comments(p
         readdress_camera(path, "c7", tried())
 
 
+COMMENTED = """\
+cameras:
+# at the door
+- id: c0  # faces east
+  # a cable of 80 m
+  source: rtsp://10.0.0.1/live  # {beside}
+  substream: rtsp://10.0.0.1/small  # people are tracked in it
+  offset_s: 0.5  # measured
+  options:  # of FFmpeg
+    rtsp_transport: udp  # in vain
+  # the plant
+  passthrough: auto  # if it can
+- {{id: c1, source: scene:room}}  # drawn
+"""
+
+
+@pytest.mark.parametrize("beside", ["H.264 64x48, 5 fps", "over the till, 4 m up"])
+def test_comments_in_the_entry_of_a_camera_with_another_address_stay(path: Path, beside: str) -> None:
+    """What set-up has written beside the address becomes what the camera sends now."""
+    text = COMMENTED.format(beside=beside)
+    path.write_text(text)
+    trial = StreamTrial(codec="H.265", width=128, height=96)
+    readdress_camera(path, "c0", TriedCamera(1, "", TriedStream(tried().address, trial)))
+    entry = """\
+- id: c0  # faces east
+  # a cable of 80 m
+  source: {source}  # {beside}
+  offset_s: 0.5  # measured
+  options:  # of FFmpeg
+    {{rtsp_transport: tcp}}
+  # the plant
+  passthrough: auto  # if it can
+  password: site.passwords/c0
+"""
+    now = "H.265 128x96" if "64x48" in beside else beside
+    written = entry.format(source=tried().address.source, beside=now)
+    first, last = text.index("- id: c0"), text.index("- {id: c1")
+    assert path.read_text() == text[:first] + written + text[last:]
+
+
 def test_a_substream_stays_with_its_address(path: Path) -> None:
     """Of another channel of the same recorder, other people would be tracked."""
     small = "rtsp://10.0.0.1/small"

@@ -89,7 +89,7 @@ def test_a_site_without_zones_gets_the_sections(path: Path) -> None:
 def test_a_changed_zone_keeps_its_place_comments_and_other_settings(path: Path) -> None:
     save_zone(path, change("till", QUEUE, replaces="till"))
     assert (
-        "  # where people pay\n  - {id: till, area: [[0, 0], [2.5, 0], [2, 3]], hold_s: 1.0}\n"
+        "  # where people pay\n  - {id: till, area: [[0, 0], [2.5, 0], [2, 3]], hold_s: 1.0}  # one\n"
         in path.read_text()
     )
     config = load_config(path)
@@ -137,14 +137,15 @@ def test_what_restricts_a_rule_is_saved_and_what_stays_the_same_keeps_its_text(p
     assert written in path.read_text()
     week = list(load_config(path).rules[1].days)
     save_zone(path, change("till", {**same, "days": week, "hours": ("22:00", "06:00")}, replaces="till"))
-    line = (
-        "- {id: queue, kind: crowded, zone: till, people: [Ann, 3], hours: ['22:00', '06:00'], cameras: [c0],"
-        " more_than: 4}\n"
+    block = (
+        "- id: queue  # at noon\n  kind: crowded\n  zone: till\n  more_than: 4.0\n"
+        "  hours: ['22:00', '06:00']\n  people: [Ann, 3]\n  cameras: [c0]\n"
     )
-    assert line in path.read_text()
+    assert block in path.read_text()
     cleared = {"people": [], "days": None, "hours": None, "cameras": [], "hold_s": 2.5}
     save_zone(path, change("till", {**same, **cleared}, replaces="till"))
-    assert "- {id: queue, kind: crowded, zone: till, more_than: 4, hold_s: 2.5}\n" in path.read_text()
+    block = "- id: queue  # at noon\n  kind: crowded\n  zone: till\n  more_than: 4.0\n  hold_s: 2.5\n"
+    assert block in path.read_text()
 
 
 def test_rules_on_no_zone_are_replaced_and_the_others_stay(path: Path) -> None:
