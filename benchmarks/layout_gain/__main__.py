@@ -31,6 +31,7 @@ from benchmarks.common.report import Report
 from benchmarks.layout_gain.companions import CompanionSettings, CompanionTracker
 from benchmarks.layout_gain.ground_layout import GroundLayoutTracker
 from benchmarks.layout_gain.true_positions import TruePositionTracker, true_boxes, true_companions
+from server.cli.render.plots import new_figure, save_figure
 from server.cli.track.command import newly_final_rows
 from tracking import Detections, OnlineTracker
 from tracking.boxes import Floats
@@ -110,7 +111,7 @@ def development(recordings: Sequence[Recording], seeds: int, out: Path) -> None:
     ways = {"default": OnlineTracker, **forms()}
     inputs = [DetectedRecording.of(recording, pictures=True) for recording in recordings]
     found = {item.name: measured(item, ways, seeds) for item in inputs}
-    save(found, seeds, out / "layout_gain-development.txt")
+    save(found, seeds, out / "layout_gain-development")
 
 
 def run(recordings: Sequence[Recording], seeds: int, out: Path) -> None:
@@ -121,7 +122,7 @@ def run(recordings: Sequence[Recording], seeds: int, out: Path) -> None:
         for recording in recordings
         if recording.video and recording.video.is_file()
     ]
-    save({item.name: measured(item, item.ways(), seeds) for item in inputs}, seeds, out / "layout_gain.txt")
+    save({item.name: measured(item, item.ways(), seeds) for item in inputs}, seeds, out / "layout_gain")
 
 
 def measured(item: DetectedRecording, ways: Mapping[str, Tracker], seeds: int) -> dict[str, Floats]:
@@ -130,15 +131,34 @@ def measured(item: DetectedRecording, ways: Mapping[str, Tracker], seeds: int) -
 
 
 def save(found: Mapping[str, Mapping[str, Floats]], seeds: int, path: Path) -> None:
-    """Print and save the table: by recording, then by way, the default first."""
+    """Print and save the table and the plot: by recording, then by way, the default first."""
     report = Report()
     first, *others = next(iter(found.values()))
+    gains = {name: [scores[name] - scores[first] for scores in found.values()] for name in others}
     rows = [[first, *(f"{scores[first].mean():.1f}" for scores in found.values())]]
-    for name in others:
-        gains = [scores[name] - scores[first] for scores in found.values()]
-        rows.append([name, *(f"{gain.mean():+.1f} (≥ {gain.min():+.1f})" for gain in gains)])
+    rows += [
+        [name, *(f"{gain.mean():+.1f} (≥ {gain.min():+.1f})" for gain in by)] for name, by in gains.items()
+    ]
     report.table(f"IDF1, %, and gain by each term: mean of {seeds} seeds (the least)", ["", *found], rows)
-    report.save(path)
+    report.save(path.with_suffix(".txt"))
+    plot(gains, list(found), path.with_suffix(".png"))
+
+
+def plot(gains: Mapping[str, Sequence[Floats]], recordings: Sequence[str], path: Path) -> None:
+    """Draw each form's gain: a point for each recording's mean, and a line from the least to the greatest."""
+    figure = new_figure((8.0, 0.5 + 0.55 * len(gains)))
+    axis = figure.subplots()
+    for index, recording in enumerate(recordings):
+        mean = np.array([by[index].mean() for by in gains.values()])
+        spread = np.array([[by[index].min(), by[index].max()] for by in gains.values()]).T
+        rows = np.arange(len(gains)) + 0.6 * (index / max(1, len(recordings) - 1) - 0.5)
+        axis.errorbar(mean, rows, xerr=np.abs(spread - mean), fmt="o", markersize=4, label=recording)
+    axis.axvline(0.0, color="gray", linewidth=0.8)
+    axis.set_yticks(range(len(gains)), list(gains))
+    axis.invert_yaxis()
+    axis.set(xlabel="IDF1 gained by the layout term, points")
+    axis.legend(fontsize="small")
+    save_figure(figure, path)
 
 
 def main() -> None:
