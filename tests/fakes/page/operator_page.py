@@ -43,6 +43,14 @@ async def operator_page(browser: Browser, port: int, place: str = "", axe: str =
     assert complaints == []
 
 
+async def press_picture(page: Page, point: tuple[float, float], size: tuple[int, int]) -> None:
+    """Mark a point, in pixels, in the picture of the given size in which places of the floor are marked."""
+    box = await page.locator("#points-stage").bounding_box()
+    assert box is not None
+    x, y = point[0] / size[0] * box["width"], point[1] / size[1] * box["height"]
+    await page.locator("#points-stage").click(position={"x": x, "y": y})
+
+
 async def check_button_sizes(page: Page) -> None:
     for button in await page.locator("button:visible, select:visible, nav a").all():
         box = await button.bounding_box()

@@ -26,9 +26,14 @@ _GOP = 10
 
 
 @cache
+def room() -> Scene:
+    """Return the scene that the main streams show."""
+    return Scene("room", len(NAMES), 4, 1, *MAIN, FPS)
+
+
+@cache
 def _images(camera: int) -> list[np.ndarray[tuple[int, ...], np.dtype[np.uint8]]]:
-    scene = Scene("room", len(NAMES), 4, 1, *MAIN, FPS)
-    return [scene.image(camera, _START + pulse) for pulse in range(_FRAMES)]
+    return [room().image(camera, _START + pulse) for pulse in range(_FRAMES)]
 
 
 @cache

@@ -14,7 +14,13 @@ import pytest_asyncio
 from playwright.async_api import Browser, Page, expect
 
 from benchmarks.common.browser import chromium
-from fakes.page.operator_page import check_button_sizes, open_operator_page, operator_page, serious_faults
+from fakes.page.operator_page import (
+    check_button_sizes,
+    open_operator_page,
+    operator_page,
+    press_picture,
+    serious_faults,
+)
 from fakes.paths import AXE
 from fakes.programs import needs_chromium
 from fakes.service.drawn_site import drawn_room
@@ -59,12 +65,8 @@ async def room_page(browser: Browser, path: Path, axe: str = "") -> AsyncIterato
 
 async def press(page: Page, camera: int, place: tuple[float, float]) -> None:
     """Press where a camera sees a place."""
-    box = await page.locator("#points-stage").bounding_box()
-    assert box is not None
     ((x, y),) = image_of(camera, place).tolist()
-    await page.locator("#points-stage").click(
-        position={"x": x / WIDTH * box["width"], "y": y / HEIGHT * box["height"]}
-    )
+    await press_picture(page, (x, y), (WIDTH, HEIGHT))
 
 
 async def enter(page: Page, place: int, x: str, y: str) -> None:
