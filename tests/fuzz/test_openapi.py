@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import logging
+import socket
 import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from schemathesis.checks import content_type_conformance, response_schema_confor
 
 from benchmarks.fuzz.http.served_site import ServedSite
 from fakes.timeouts import PATIENCE
+from server.http.access.csrf import CSRF_HEADER
 
 CASES = 4
 """Per operation and mode; of endless streams only the beginning is read."""
@@ -86,6 +88,16 @@ def test_every_answer_is_documented(
         with contextlib.suppress(Unsatisfiable):  # no invalid request exists
             ask()
     assert not [record for record in caplog.records if record.exc_info and record.levelno >= logging.WARNING]
+
+
+def test_the_answer_while_a_camera_keeps_silent_is_documented(documented_site: Site) -> None:
+    operation = documented_site.operations["POST /api/operator/site_cameras"]
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"rtsp://127.0.0.1:{silent.getsockname()[1]}/"
+        answer = operation.Case(headers={CSRF_HEADER: "1"}).call_and_validate(
+            base_url=documented_site.url, timeout=PATIENCE, checks=CHECKS, json={"address": address}
+        )
+    assert (answer.status_code, answer.json().get("ahead")) == (202, 0), answer.text
 
 
 def _has(operation: Any, mode: GenerationMode) -> bool:

@@ -17,7 +17,7 @@ from server.http.access.session_routes import SessionInfo
 from server.http.api.past_search import PAST_SEARCH_QUERIES
 from server.http.api.schema import Cameras, Delays, FlagList, Objects, Past, SiteInfo
 from server.http.json_responses import Problem
-from server.http.operator.schema import OPERATOR, OPERATOR_FILES, OPERATOR_RESULTS
+from server.http.operator.schema import OPERATOR, OPERATOR_FILES, OPERATOR_RESULTS, TrialProgress
 from server.http.streams.request_validation import CAMERA_QUERY, DELAY, OVERLAY, TIME_SHIFT, TRANSCODED
 from server.service.facade.past_search import PastSearchResult
 from server.service.facade.rules import Rules
@@ -102,6 +102,8 @@ _CONFLICTS = {
     _DELETION: "Another deletion is not complete yet.",
     _SEARCH: "The zone is on the floor, and no camera is calibrated.",
 }
+_TRIES = {("POST", "/api/operator/site_cameras"), ("POST", "/api/operator/setup/streams")}
+"""Operations that speak to a camera, for as long as that takes."""
 _FROM_REQUIRED = {"/api/past", _SEARCH, *OPERATOR_FILES}
 _RECORDED_SPANS = {"/api/objects/{object}/past", "/api/cameras/{camera}/past"}
 _MOMENT = {"type": "string", "examples": ["-60", "p1250", "2026-11-21T16:13:36Z"]}
@@ -176,7 +178,7 @@ def describe(app: web.Application) -> dict[str, Any]:
             continue
         path = route.resource.canonical
         if path in _JSON or path in _MEDIA_TYPES:
-            operation = _operation(path, inspect.getdoc(route.handler) or "")
+            operation = _operation(path, inspect.getdoc(route.handler) or "", route.method)
             paths.setdefault(path, {})[route.method.lower()] = operation
     return {
         "openapi": "3.1.0",
@@ -186,13 +188,17 @@ def describe(app: web.Application) -> dict[str, Any]:
     }
 
 
-def _operation(path: str, summary: str) -> dict[str, Any]:
-    if path in _JSON:
-        content = {"application/json": {"schema": {"$ref": f"#/components/schemas/{_JSON[path].__name__}"}}}
-    else:
-        content = {_MEDIA_TYPES[path]: {}}
-    error = {"application/json": {"schema": {"$ref": "#/components/schemas/Problem"}}}
+def _json_content(struct: type[msgspec.Struct]) -> dict[str, Any]:
+    return {"application/json": {"schema": {"$ref": f"#/components/schemas/{struct.__name__}"}}}
+
+
+def _operation(path: str, summary: str, method: str) -> dict[str, Any]:
+    content = _json_content(_JSON[path]) if path in _JSON else {_MEDIA_TYPES[path]: {}}
+    error = _json_content(Problem)
     responses: dict[str, Any] = _success(path, content, error)
+    if (method, path) in _TRIES:
+        description = "It takes longer: ask /api/operator/setup/trials/{key} for the result."
+        responses["202"] = {"description": description, "content": _json_content(TrialProgress)}
     names = re.findall(r"\{(\w+)\}", path)
     if names or path in OPERATOR_RESULTS or path in {_SEARCH, _DELETION}:
         responses["404"] = {"description": "No object, camera or file of this name.", "content": error}
