@@ -83,8 +83,9 @@ async def _list(url: str, settings: HttpSettings) -> None:
         visible = "yes" if person.visible else "no"
         table.add_row(label, visible, person.camera or "-", " ".join(person.cameras))
     for other in await elsewhere(url, settings):
-        if other.site is not None:
-            table.add_row(str(other.object), "yes" if other.visible else "no", f"site {other.site}", "")
+        if other.visible is not None:
+            place = "another area" if other.site is None else f"site {other.site}"
+            table.add_row(str(other.object), "yes" if other.visible else "no", place, "")
     Console().print(table)
 
 

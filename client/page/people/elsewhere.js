@@ -55,7 +55,7 @@ export class PeopleElsewhere {
  * @returns {string | null} the address of the page there with this person; null: this page has them
  */
 function addressOf({ object, server, site, visible }) {
-  if (!(site || visible) || !server || !URL.canParse(server)) return null;
+  if (!(site || typeof visible === 'boolean') || !server || !URL.canParse(server)) return null;
   const address = new URL(server);
   if (!['http:', 'https:'].includes(address.protocol)) return null;
   address.searchParams.set('object', String(object));
@@ -65,5 +65,5 @@ function addressOf({ object, server, site, visible }) {
 /** @param {Elsewhere & {address: string}} person */
 function item({ object, site, visible, address }) {
   const link = make('a', { href: address, textContent: `Person ${object}` });
-  return make('li', {}, link, site ? (visible ? ` at ${site}` : ` left ${site}`) : ' in another area');
+  return make('li', {}, link, site ? (visible ? ` at ${site}` : ` left ${site}`) : visible ? ' in another area' : ' was in another area');
 }

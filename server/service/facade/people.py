@@ -61,7 +61,7 @@ class RemotePerson:
     server: str | None
     """Base URL of that service; None where the configuration does not name it."""
     is_visible: bool | None
-    """True: in the area of that service; None: it has the same cameras as this one."""
+    """Whether that service sees them now; None: it has the same cameras as this one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +143,7 @@ class PeopleService:
             RemotePerson(
                 number,
                 share_address(people.of_service.share_of(number), share),
-                True if share.areas else None,
+                people.of_service.is_visible_elsewhere(number),
             )
             for number in people.of_other_shards
         ]

@@ -30,10 +30,17 @@ class TracksOfPeople:
 
 @dataclass(frozen=True, slots=True)
 class OtherArea:
-    """The first other area that has a person, and the last frame in which they certainly were there."""
+    """The first other area that has a person.
+
+    Attributes:
+        area: its index.
+        here: the last frame in which they certainly were there.
+        is_visible: whether its service sees them now.
+    """
 
     area: int
     here: int
+    is_visible: bool
 
 
 class PeopleOfService(Protocol):
@@ -52,6 +59,10 @@ class PeopleOfService(Protocol):
 
     def share_of(self, number: int) -> int:
         """Return the share that a number belongs to, as far as is known."""
+        ...
+
+    def is_visible_elsewhere(self, number: int) -> bool | None:
+        """Return whether another service sees one of its people now; None: all see the same."""
         ...
 
     def is_reported(self, number: int) -> bool:
@@ -96,6 +107,9 @@ class PeopleByNumber:
     def share_of(self, number: int) -> int:
         """Return the share of a number, whether or not it is in use."""
         return number % self._share.of
+
+    def is_visible_elsewhere(self, number: int) -> None:
+        """Return None: all services have the same cameras."""
 
     def is_reported(self, number: int) -> bool:  # noqa: ARG002
         """Return true: only the first service reports."""
@@ -151,6 +165,11 @@ class PeopleOfArea:
         if number in self._seen or number not in self._elsewhere:
             return self._share.share
         return self._elsewhere[number].area
+
+    def is_visible_elsewhere(self, number: int) -> bool:
+        """Return whether another area's service says that it sees somebody now."""
+        other = self._elsewhere.get(number)
+        return other is not None and other.is_visible
 
     def is_reported(self, number: int) -> bool:
         """Return whether nobody else has a person, or of all their areas this is the first."""

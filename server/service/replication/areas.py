@@ -21,11 +21,14 @@ from server.service.replication.disagreements import (
     follow,
     numbers_of_tracks,
 )
+from tracking.frame_rate import frames_in
 
 log = logging.getLogger(__name__)
 
 _WAITING_MAX = 30
 """Records of a service that wait until this one is at their pulse, at most."""
+_VISIBLE_S = 1.0
+"""Seconds after which somebody whom another service has not certainly seen in its area is out of its view."""
 
 
 class AreaAgreement:
@@ -36,8 +39,9 @@ class AreaAgreement:
     keeps theirs.
     """
 
-    def __init__(self, share: ShareSettings, people: PersonTracker) -> None:
+    def __init__(self, share: ShareSettings, people: PersonTracker, fps: float) -> None:
         self._share, self._people = share, people
+        self._unseen = frames_in(_VISIBLE_S, fps)
         self._cameras = frozenset(share.cameras or ())
         self._next_numbers = [1] * len(share.areas)
         self._last_found: dict[int, Disagreements] = {}
@@ -114,7 +118,7 @@ class AreaAgreement:
         last_area_first = sorted(others, key=lambda record: record.service % of, reverse=True)
         area.hear(
             {
-                number: OtherArea(record.service % of, stay.here)
+                number: OtherArea(record.service % of, stay.here, record.pulse - stay.here <= self._unseen)
                 for record in last_area_first
                 for number, stay in record.in_area.items()
             }

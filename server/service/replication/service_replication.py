@@ -85,7 +85,7 @@ class ServiceReplication:
     ) -> None:
         share = config.view.share
         self._index, self._services = share.index, share.services
-        self._areas = AreaAgreement(share, people)
+        self._areas = AreaAgreement(share, people, config.site.fps)
         self._cameras, self._fps = config.camera_ids, config.site.fps
         self._interval = (
             1 if share.areas else max(1, round(_INTERVAL_S * config.site.fps / config.window.stride))

@@ -23,10 +23,16 @@ async def test_the_page_goes_with_the_selected_person_and_shows_the_others(brows
             {"object": 9, "visible": False, **at_yard},
             {"object": 4, "server": "http://two/", "site": None, "visible": None, "token": False},
             {"object": 6, "server": "http://two/", "site": None, "visible": True, "token": False},
+            {"object": 8, "server": "http://two/", "site": None, "visible": False, "token": False},
             {"object": 5, "server": "javascript:alert(1)", "site": "yard", "visible": True, "token": False},
         ]
         await expect(visit.page.locator("#elsewhere li")).to_have_text(
-            ["Person 7 at yard", "Person 9 left yard", "Person 6 in another area"]
+            [
+                "Person 7 at yard",
+                "Person 9 left yard",
+                "Person 6 in another area",
+                "Person 8 was in another area",
+            ]
         )
         assert visit.page.url.endswith("?object=1"), "who is here is not looked for elsewhere"
         hall.people = {1: False, 2: True}

@@ -60,7 +60,9 @@ class TwoServices:
             there = [dict(area.present) for area in self.areas()]
             for index, area in enumerate(self.areas()):
                 other = 1 - index
-                area.hear({number: OtherArea(other, here) for number, here in there[other].items()})
+                area.hear(
+                    {number: OtherArea(other, here, is_visible=True) for number, here in there[other].items()}
+                )
 
     def name(self, number: int, name: str) -> None:
         """Name a person, as the snapshots of a site's former single service do."""

@@ -331,7 +331,7 @@ async def test_a_client_stays_when_somebody_walks_into_another_area(
             assert isinstance(area, PeopleOfArea)
             await more(frames, FPS)
             assert east.service.splicer.viewers == 0
-            area.hear({1: OtherArea(1, 1_000_000)})
+            area.hear({1: OtherArea(1, 1_000_000, is_visible=True)})
             monkeypatch.setattr(area, "hear", lambda _: None)  # and the other service says so from now on
             await until(lambda: east.service.splicer.viewers == 1)
             await more(frames, 2 * FPS)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import sys
 from collections.abc import AsyncIterator, Sequence
 from typing import Any
 
@@ -11,6 +13,7 @@ import numpy as np
 import pytest
 
 from fakes.service.scripted_cameras import CAMERAS, SMALL, FedService, camera_tracks, epoch_of, small_config
+from fakes.timeouts import PATIENCE
 from server.config.sections import HttpSettings, ShareSettings
 from server.config.site_config import Config
 from server.http.app import make_app, serving
@@ -93,7 +96,8 @@ class TwoAreas:
         """Show both services person 7 in some cameras; return in which areas the person is."""
         for index, area in enumerate(self.areas):
             other = {
-                number: OtherArea(1 - index, last) for number, last in self.areas[1 - index].present.items()
+                number: OtherArea(1 - index, last, is_visible=True)
+                for number, last in self.areas[1 - index].present.items()
             }
             area.update([TracksOfPeople(message, [7]) for message in seen], frame)
             area.hear(other)
@@ -206,7 +210,7 @@ async def west_service() -> AsyncIterator[str]:
         service.feed(epoch, {"c0": {1: SMALL}})
     area = service.decider.people.of_service
     assert isinstance(area, PeopleOfArea)
-    area.hear({2: OtherArea(1, 0)})
+    area.hear({2: OtherArea(1, 0, is_visible=True), 4: OtherArea(1, 0, is_visible=False)})
     async with serving(make_app(BestViewService(service)), HttpSettings(port=0)) as port:
         yield f"http://127.0.0.1:{port}"
     service.close()
@@ -216,8 +220,19 @@ async def test_people_of_other_areas_are_listed_with_their_service(west_service:
     async with aiohttp.ClientSession() as session, session.get(west_service + "/api/objects") as answer:
         listed = await answer.json()
     assert [person["object"] for person in listed["objects"]] == [1]
-    (elsewhere,) = listed["elsewhere"]
-    assert (elsewhere["object"], elsewhere["server"], elsewhere["visible"]) == (2, "http://east:1/", True)
+    assert [(each["object"], each["server"], each["visible"]) for each in listed["elsewhere"]] == [
+        (2, "http://east:1/", True),
+        (4, "http://east:1/", False),
+    ]
+
+
+async def test_watch_lists_people_of_other_areas(west_service: str) -> None:
+    command = await asyncio.create_subprocess_exec(
+        sys.executable, "-m", "server.cli.main", "watch", west_service, stdout=asyncio.subprocess.PIPE
+    )
+    output, _ = await asyncio.wait_for(command.communicate(), PATIENCE)
+    rows = [line.split() for line in output.decode().splitlines()]
+    assert rows[2:] == [["2", "yes", "another", "area"], ["4", "no", "another", "area"]]
 
 
 async def test_live_requests_for_another_area_are_redirected(west_service: str) -> None:

@@ -88,7 +88,7 @@ class TestAgreement:
 
     def test_a_number_that_somebody_else_has_here_is_not_taken(self, service: FedService) -> None:
         people = service.decider.people
-        agreement = AreaAgreement(service.config.view.share, people)
+        agreement = AreaAgreement(service.config.view.share, people, 25.0)
         for pulse in range(20, 60, 5):
             there = self.record(1, pulse, {2: 1}, {1: 0})
             agreement.receive(there)
@@ -97,7 +97,7 @@ class TestAgreement:
 
     def test_the_names_of_people_in_another_area_are_taken_over(self, service: FedService) -> None:
         people = service.decider.people
-        agreement = AreaAgreement(service.config.view.share, people)
+        agreement = AreaAgreement(service.config.view.share, people, 25.0)
         there = self.record(1, 20, {1: 1, 2: 2, 3: 77}, {1: 0, 77: 0})
         named = [
             msgspec.structs.replace(person, name=f"Ann {person.number}")
@@ -106,6 +106,16 @@ class TestAgreement:
         snapshot = msgspec.structs.replace(there.cameras["c1"], people=named)
         agreement.receive(msgspec.structs.replace(there, cameras={"c1": snapshot}))
         assert people.registry.names == {1: "Ann 1"}, "2 is not there, 77 is not known here"
+
+    def test_whom_another_area_has_lost_is_not_visible_there(self, service: FedService) -> None:
+        people = service.decider.people
+        agreement = AreaAgreement(service.config.view.share, people, 25.0)
+        for pulse, is_visible in [(20, True), (45, True), (46, False), (9000, False)]:
+            there = self.record(1, pulse, {}, {77: 0})
+            stays = {77: Stay(first_seen=0, here=20)}
+            agreement.step({}, [msgspec.structs.replace(there, in_area=stays)])
+            assert people.of_service.is_visible_elsewhere(77) is is_visible
+        assert people.of_other_shards == [77], "they belong to it nevertheless"
 
     @pytest.mark.parametrize("area", [0, 1, 2])
     def test_somebody_in_three_areas_is_reported_by_the_first(self, area: int) -> None:
@@ -118,7 +128,7 @@ class TestAgreement:
         service.connect_cameras(f"c{area}")
         for epoch in range(4):
             service.feed(epoch, {f"c{area}": {1: SMALL}})
-        agreement = AreaAgreement(service.config.view.share, people)
+        agreement = AreaAgreement(service.config.view.share, people, 25.0)
         others = [self.record(other, 20, {1: 1}, {1: 0}) for other in range(3) if other != area]
         for live in (others, others[::-1]):
             agreement.step({}, live)
@@ -131,7 +141,7 @@ class TestAgreement:
         people = service.decider.people
         reserved: list[int] = []
         monkeypatch.setattr(people, "reserve_numbers_below", reserved.append)
-        agreement = AreaAgreement(service.config.view.share, people)
+        agreement = AreaAgreement(service.config.view.share, people, 25.0)
         agreement.receive(self.record(1, 20, {}, {}))
         assert agreement.next_numbers[1] == 31
         assert reserved == [600]
