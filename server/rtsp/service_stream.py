@@ -22,6 +22,7 @@ _CONNECT_S = 4.0
 """Seconds for the connection and the answer's head: an RTSP client waits meanwhile."""
 _OPEN_S = 8.0
 """Seconds for all redirects together."""
+_LATE = "its answer is not complete after {:g} s"
 _SILENT_S = 10.0
 """Seconds without a byte after which the service counts as gone: streams have no gaps."""
 _READ_BYTES = 65_536
@@ -90,10 +91,12 @@ class Service:
                 connection = http.client.HTTPConnection(host, port, timeout=_CONNECT_S)
         except (OSError, http.client.HTTPException, ValueError) as error:
             raise ServiceAwayError(str(error)) from error
+        is_late = threading.Event()
         try:
             connection.connect()
             connected = connection.sock  # an answer without keep-alive takes it away
-            timer = threading.Timer(max(0.0, until - time.monotonic()), _shut_down, [connected])
+            left_s = max(0.0, until - time.monotonic())
+            timer = threading.Timer(left_s, _give_up, [connected, is_late])
             timer.start()
             try:
                 target = urllib.parse.urlunsplit(("", "", *address[2:4], ""))
@@ -102,15 +105,18 @@ class Service:
                 connected.settimeout(_SILENT_S)
             finally:
                 timer.cancel()
-        except OSError as error:
+        except (OSError, http.client.HTTPException, ValueError) as error:
             connection.close()
-            raise ServiceAwayError(str(error) or type(error).__name__) from error
-        except (
-            http.client.HTTPException,
-            ValueError,
-        ) as error:  # the text may have the address, with the token
-            connection.close()
+            if is_late.is_set():
+                raise ServiceAwayError(_LATE.format(_OPEN_S)) from None
+            if isinstance(error, OSError):
+                raise ServiceAwayError(str(error) or type(error).__name__) from error
+            # the text may have the address, with the token
             raise ServiceAwayError(f"it does not answer by HTTP ({type(error).__name__})") from None
+        if is_late.is_set():  # a head that is cut off looks complete
+            response.close()
+            connection.close()
+            raise ServiceAwayError(_LATE.format(_OPEN_S))
         if response.status != _OK:
             location = response.getheader("Location")
             response.close()
@@ -156,6 +162,11 @@ def _redirected(url: str, location: str, path: str) -> str:
     if before.scheme == "https" and after.scheme == "http":
         raise ServiceAwayError(f"it redirects to {host}, which does not encrypt")
     return found
+
+
+def _give_up(connected: socket.socket, is_late: threading.Event) -> None:
+    is_late.set()
+    _shut_down(connected)
 
 
 def _shut_down(connected: socket.socket) -> None:

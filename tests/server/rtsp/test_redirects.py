@@ -101,7 +101,8 @@ def test_a_token_that_only_another_service_refuses_is_not_wrong(serve: Serve) ->
         Service(serve(lambda _: redirect(f"{there}objects/1/best.mp4"))).open(PATH, TOKEN)
 
 
-def test_an_answer_that_never_ends_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("begin", ["", "HTTP/1.1 200 OK\r\n", "HTTP/1.1 307 Elsewhere\r\n"])
+def test_an_answer_that_never_ends_is_given_up(monkeypatch: pytest.MonkeyPatch, begin: str) -> None:
     monkeypatch.setattr(opened, "_OPEN_S", 0.3)
     ended = threading.Event()
     with socket.create_server(("127.0.0.1", 0)) as server:
@@ -109,11 +110,12 @@ def test_an_answer_that_never_ends_is_given_up(monkeypatch: pytest.MonkeyPatch) 
         def drip() -> None:
             connection, _ = server.accept()
             with connection, suppress(OSError):  # the client ends the connection
+                connection.sendall(begin.encode())
                 while not ended.wait(0.02):
                     connection.sendall(b"H")
             ended.set()
 
         threading.Thread(target=drip, daemon=True).start()
-        with pytest.raises(ServiceAwayError):
+        with pytest.raises(ServiceAwayError, match=r"^its answer is not complete after 0\.3 s$"):
             Service(f"http://127.0.0.1:{server.getsockname()[1]}/").open(PATH, None)
         assert ended.wait(PATIENCE)
