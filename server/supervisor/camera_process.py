@@ -86,9 +86,14 @@ class _Attempts:
             log.warning("camera %s: %s%s; opening it again", self._id, error, more)
         await self._wait()
 
+    def settings_changed(self) -> None:
+        """Begin with the shortest delay again: other settings may be right."""
+        self._backoff.reset()
+
     async def _wait(self) -> None:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(self.restart.wait(), self._backoff.next())
+            self.settings_changed()
 
 
 async def _create(
@@ -128,6 +133,8 @@ async def _run(camera: CameraProcess, attempts: _Attempts) -> bool:
         await asyncio.wait({run, waiting}, return_when=asyncio.FIRST_COMPLETED)
         if run.done():
             run.result()
+        else:
+            attempts.settings_changed()
         return run.done()
     except UnavailableError as error:  # what the camera sends has changed
         await attempts.changed(error, loop.time() - began)

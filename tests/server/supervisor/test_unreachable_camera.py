@@ -28,6 +28,7 @@ from server.messaging.bus import Bus
 from server.messaging.messages import ZenohKeys
 from server.supervisor import camera_process as camera_module
 from server.supervisor.camera_process import camera_process
+from server.system.errors import UnavailableError
 
 
 class LogLines(logging.Handler):
@@ -210,3 +211,12 @@ async def test_a_camera_that_changes_again_and_again_is_opened_less_and_less_oft
     assert not site.process.done()
     changes = [line for line in site.log_lines.lines if "its images are" in line]
     assert 1 <= len(changes) <= 2, "one line for each change: larger, and smaller again"
+
+
+async def test_other_settings_are_tried_as_if_nothing_had_failed() -> None:
+    restart = asyncio.Event()
+    restart.set()
+    attempts = camera_module._Attempts("c0", restart)
+    for _ in range(5):
+        await attempts.failed(UnavailableError("c0: no route"))
+    assert attempts._backoff.failures == 0
