@@ -17,7 +17,7 @@ from benchmarks.robustness.disturbances.base import Disturbance, Moment
 from benchmarks.robustness.disturbances.catalog import CATALOG, STRENGTHS
 from benchmarks.robustness.disturbances.lens import Covered
 from benchmarks.robustness.disturbances.light import Gain
-from benchmarks.robustness.disturbances.motion import Knock, Sway
+from benchmarks.robustness.disturbances.motion import Knock, Sway, TurnedAway
 from benchmarks.robustness.disturbances.transmission import Frozen, LowRateH264
 from benchmarks.robustness.disturbed_views import Disturbed, DisturbedSource
 from benchmarks.scene_runs.scores import rolling_f1
@@ -96,6 +96,20 @@ def test_a_disturbance_begins_at_its_frame_with_its_strength_and_is_equal_in_eve
 def test_a_disturbance_of_some_seconds_ends_and_one_of_one_camera_spares_the_others() -> None:
     assert changed(frames_of(Gain(factor=0.5, lasts_s=1.5))) == list(range(START, START + 15))
     assert changed(frames_of(Gain(factor=0.5, one_camera=True), camera=1)) == []
+
+
+def test_what_a_turned_camera_shows_anew_stands_still_whoever_walks_at_the_margin() -> None:
+    effect, wall, shown = TurnedAway(shift=0.4).begin(), Corridor().wall, []
+    for frame in range(30):
+        image = wall.copy()
+        image[30:100, : (20 if frame % 4 == 3 else 0)] = 250
+        image = np.rint(image * (1.0 if frame < 20 else 0.5)).astype(np.uint8)
+        picture = effect(image, Moment(frame, frame / FPS, 1, 0))
+        assert picture is not None
+        shown.append(picture[:, :64].astype(float))
+    for picture in shown[10:20]:
+        assert np.abs(picture - shown[10]).max() <= 1.0
+    assert shown[25] == pytest.approx(0.5 * shown[10], abs=2.0), "it is as dark as the rest"
 
 
 def test_compressed_pictures_are_those_of_their_frames() -> None:

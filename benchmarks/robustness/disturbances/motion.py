@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
-from benchmarks.robustness.disturbances.base import Affine, Disturbance, Moment, fade
+from benchmarks.robustness.disturbances.base import Affine, Disturbance, Effect, Moment, as_image, fade
 from server.camera.sources import Image
 
 
@@ -72,15 +73,32 @@ class TurnedAway(_Moving):
         matrix[0, 2] = self.shift * size[0] * fade(moment.seconds, 0.0, self.takes_s)
         return matrix
 
-    def apply(self, image: Image, moment: Moment) -> Image:
-        """Move the picture; what comes into view is a wall in the colors of the margin."""
-        height, width = image.shape[:2]
-        matrix = self.motion(moment, (width, height))
-        moved = cv2.warpAffine(image, matrix, (width, height), borderMode=cv2.BORDER_REPLICATE)
-        new = round(float(matrix[0, 2]))
-        if new > 1:  # without the stripes of the replicated margin
-            moved[:, :new] = cv2.blur(moved[:, :new], (1, max(height // 4, 1)))
-        return np.asarray(moved, dtype=np.uint8)
+    def begin(self) -> Effect:
+        """Return what moves the pictures; what comes into view is a wall, in the light of the moment.
+
+        It has the colors of the margin of the first picture, so that it stands still whoever walks there.
+        """
+        first: list[Image] = []
+
+        def turn(image: Image, moment: Moment) -> Image:
+            if not first:
+                first.append(image)
+            height, width = image.shape[:2]
+            matrix = self.motion(moment, (width, height))
+            moved = cv2.warpAffine(image, matrix, (width, height), borderMode=cv2.BORDER_REPLICATE)
+            new = round(float(matrix[0, 2]))
+            if new > 0:
+                wall = cv2.blur(first[0][:, :1], (1, max(height // 4, 1)))
+                moved[:, :new] = as_image(wall * _light(first[0], image))
+            return np.asarray(moved, dtype=np.uint8)
+
+        return turn
+
+
+def _light(before: Image, image: Image) -> NDArray[np.float32]:
+    """Return by how much most of a picture is brighter than one before it, in each channel."""
+    ratio = (image[::4, ::4].astype(np.float32) + 1.0) / (before[::4, ::4].astype(np.float32) + 1.0)
+    return np.asarray(np.median(ratio, axis=(0, 1)), dtype=np.float32)
 
 
 def rotation(degrees: float, size: tuple[int, int]) -> Affine:
