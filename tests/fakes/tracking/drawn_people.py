@@ -50,7 +50,7 @@ def picture(figures: Sequence[Figure], frame: int, gain: float = 1.0) -> Picture
     canvas = SCENE.copy()
     for figure in sorted(figures, key=lambda figure: figure.foot):
         if figure.begin <= frame < figure.end:
-            _draw(canvas, figure, frame)
+            draw(canvas, figure, frame)
     noise = np.roll(NOISE, (7 * frame, 13 * frame), axis=(0, 1))
     return np.asarray(cv2.add(cv2.convertScaleAbs(canvas, alpha=gain), noise, dtype=cv2.CV_8U))
 
@@ -62,7 +62,8 @@ def detect_all(
     return [detector.detect(picture(figures, frame, gain)) for frame in frames]
 
 
-def _draw(canvas: Picture, figure: Figure, frame: int) -> None:
+def draw(canvas: Picture, figure: Figure, frame: int) -> None:
+    """Draw a figure where it is in a frame."""
     left, top, right, bottom = figure.box(frame)
     width, tall = right - left, bottom - top
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from tracking.detectors.background.light.tone_curve import fit_tone_curves
-from tracking.detectors.background.registration import Registration, coarse_shift
+from tracking.detectors.background.motion import STILL
+from tracking.detectors.background.registration import Registration
 from tracking.detectors.background.segmentation import largest_difference
 from tracking.detectors.base import Image
 
 # Share of the samples that have to show the old background where it is kept, and within how many gray levels.
 _SEEN, _SAME = 0.2, 12
-# Motion from one frame to the next, as a share of the width, from which a camera turns.
-_TURNS = 0.01
+# Motion from one frame to the next, and since the first, as shares of the width, from which a camera turns.
+# The second is more than that of a mast that sways by a hundredth to each side, across and down.
+_TURNS, _TURNS_SLOWLY = 0.01, 0.03
 
 
 class MedianSamples:
@@ -39,8 +41,14 @@ class MedianSamples:
         self._images.append(fit_tone_curves(aligned, first).invert(aligned, first))
 
     def have_moved(self, image: Image) -> bool:
-        """Return whether a picture lies elsewhere than the last one, since the camera turns."""
-        return bool(self._images) and coarse_shift(self._last, image) > _TURNS
+        """Return whether a picture lies elsewhere than the others, since the camera turns."""
+        if not self._images:
+            return False
+        last = Registration()
+        last.set_background(self._last)
+        return _lies_elsewhere(last, image, _TURNS) or _lies_elsewhere(
+            self._registration, image, _TURNS_SLOWLY
+        )
 
     def median(self, retired: Image | None) -> Image:
         """Return the median of the frames, at least one.
@@ -54,3 +62,12 @@ class MedianSamples:
             seen = np.mean([largest_difference(sample, old) < _SAME for sample in samples], axis=0)
             np.copyto(median, old, where=(seen >= _SEEN)[..., None])
         return median
+
+
+def _lies_elsewhere(background: Registration, image: Image, least: float) -> bool:
+    """Return whether the motion that most edges of a background follow is more than a share of the width.
+
+    People who all walk one way move fewer of them; phase correlation may see hardly anything else.
+    """
+    motion, size = background.search(image), (image.shape[1], image.shape[0])
+    return motion is None or motion.distance(STILL, size) > least * size[0]

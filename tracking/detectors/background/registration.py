@@ -8,7 +8,6 @@ coarse pictures and by phase correlation.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import cv2
@@ -114,10 +113,13 @@ class Registration:
         return points.under(IDENTITY, None).refine(_smooth_gray(image), STILL, _STEPS_OF_SEARCH)[1]
 
     def search(self, image: Image) -> Motion | None:
-        """Return the likeliest motion of an image at any light, from anywhere; None: none is plausible."""
+        """Return the likeliest motion of an image at any light, from anywhere; None: none is plausible.
+
+        A background without edges never moves.
+        """
         points = self._points
         if points is None or points.count < _MIN_POINTS:
-            return None
+            return STILL
         gray = _smooth_gray(image)
         alignment = points.under(IDENTITY, None)
         starts = (STILL, *alignment.coarse_starts(gray, STILL))
@@ -165,12 +167,6 @@ def _is_plausible(motion: Motion, size: tuple[int, int]) -> bool:
 def _smooth_gray(image: Image) -> Plane:
     gray = cv2.GaussianBlur(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), _BLUR, _BLUR_SIGMA)
     return gray.astype(np.float32)
-
-
-def coarse_shift(one: Image, other: Image) -> float:
-    """Return by how much most of a picture has moved to another, as a share of its width."""
-    first, second = (_quarter(_smooth_gray(image)) for image in (one, other))
-    return math.hypot(*_phase_shift(first, second)) / float(first.shape[1])
 
 
 def count_edges(image: Image) -> int:
