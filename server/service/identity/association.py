@@ -15,12 +15,23 @@ Association = Callable[[], IdentityUpdate]
 Run = Callable[[Association], Future[IdentityUpdate]]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class RunningAssociation:
-    """The association of the tracks of an epoch's windows; `numbers` has its result once it has ended."""
+@dataclass(slots=True, eq=False)
+class EpochAssociation:
+    """The association of an epoch's tracks.
 
+    Attributes:
+        last: the epoch's last frame.
+        late: its late revisions.
+        windows: its windows.
+        numbers: has the result once it has ended.
+        is_taken: whether the result has been taken.
+    """
+
+    last: int
+    late: Sequence[CameraWindow]
     windows: Sequence[CameraWindow]
     numbers: Future[IdentityUpdate]
+    is_taken: bool = False
 
     async def wait(self) -> None:
         """Wait for its end; an error is raised by whoever asks for the numbers."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bestview import SINGLE_SITE, IdentityRegistry, IdentitySettings, IdSeries, Merge, Split, TrackKey
 from server.media.letterbox import Letterbox
 from server.messaging.messages import NumberedBox
-from server.service.identity.association import AssociationThread, Run, RunningAssociation, run_here
+from server.service.identity.association import AssociationThread, EpochAssociation, Run, run_here
 from server.service.identity.camera_window import CameraWindow, WindowReader
 from server.service.identity.common_ground import CommonGround
 from server.service.identity.expected_tracks import ExpectedTracks
@@ -94,21 +94,22 @@ class PersonTracker:
         self.newest = -1
         """The last frame of the newest epoch; -1: none."""
         self._thread = AssociationThread()
-        self._running: RunningAssociation | None = None
-        self._begun: tuple[int, Sequence[CameraWindow]] = (-1, ())
+        self._begun: EpochAssociation | None = None
+        """The newest association, whether or not it has ended."""
 
     def update(self, epoch: Epoch) -> Sequence[CameraWindow]:
         """Associate an epoch's tracks, unless that was done; return its windows, late revisions first."""
-        if self._begun[0] != epoch.last:
-            self._begin(epoch, run_here)
+        begun = self._begun
+        if begun is None or begun.last != epoch.last:
+            begun = self._begin(epoch, run_here)
         self.finish_association()
-        return self._begun[1]
+        return [*begun.late, *begun.windows]
 
     async def associate(self, epoch: Epoch) -> None:
         """Associate an epoch's tracks in a thread, for which changes wait; `update` returns the result."""
         await self._begin(epoch, self._thread.run).wait()
 
-    def _begin(self, epoch: Epoch, run: Run) -> RunningAssociation:
+    def _begin(self, epoch: Epoch, run: Run) -> EpochAssociation:
         """Take an epoch's windows, and begin to associate their tracks."""
         self.finish_association()
         late = [self._store(window) for window in self._reader.read_late(epoch)]
@@ -122,19 +123,19 @@ class PersonTracker:
         since = max(self.newest + 1, epoch.last + 1 - self._recent)  # epochs may have been skipped
         image_sizes = self.undetected.detecting_cameras(windows, since - self._lag, epoch.last - self._lag)
         association = partial(self._registry.update, tracks, epoch.last - self._lag, image_sizes)
-        self._begun = (epoch.last, [*late, *windows])
-        self._running = RunningAssociation(windows, run(association))
-        return self._running
+        self._begun = EpochAssociation(epoch.last, late, windows, run(association))
+        return self._begun
 
     def finish_association(self) -> None:
         """Wait for the end of a running association, and take its result."""
-        if self._running is None:
+        begun = self._begun
+        if begun is None or begun.is_taken:
             return
-        running, self._running, self.newest = self._running, None, self._begun[0]
-        update = self.overrides.apply(running.numbers.result())
+        begun.is_taken, self.newest = True, begun.last
+        update = self.overrides.apply(begun.numbers.result())
         update_parts(self._parts, update.person_ids, self._needed_from)
         self._id_switch_repair.overlay(self._parts)
-        self._record_visible(running.windows, self.newest)
+        self._record_visible(begun.windows, self.newest)
         self.registry.update_presence(update.departed, update.returned)
         for merge in update.merged:
             self._merge(merge.kept, merge.lost)

@@ -78,6 +78,7 @@ class RunningService(FedService):
     async def process(self) -> None:
         """Let the service's tasks run."""
         for _ in range(50):
-            if (running := self.decider.people._running) is not None:
-                await running.wait()
+            begun = self.decider.people._begun
+            if begun is not None and not begun.is_taken:
+                await begun.wait()
             await asyncio.sleep(0)
