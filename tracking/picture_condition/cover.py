@@ -11,15 +11,10 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from tracking.boxes import Floats
-from tracking.picture_condition.structure import FINE_NOISE, Structure, cell_means, grid_of
+from tracking.picture_condition.structure import FINE_NOISE, PART_CELLS, Cells, Structure, cell_means, grid_of
 
-Cells = npt.NDArray[np.bool_]
-
-# Cells along the longer side.
-_CELLS = 32
 # Squared gradient, gray levels per pixel, from which a cell has edges; and how many times the noise's what is
 # left of it in this light must be to be missed.
 _EDGE, _NOTICED = 1.0, 2.0
@@ -132,7 +127,7 @@ _LEAST_EDGES = 1e-4
 
 def _evidence(structure: Structure, reference: Structure, noise: float) -> _Evidence | None:
     """Return what the cells of a picture say; None: too few show the scene."""
-    grid = grid_of(structure.gray.shape, _CELLS)
+    grid = grid_of(structure.gray.shape, PART_CELLS)
     expected = cell_means(reference.across**2 + reference.down**2, grid)
     raw = cell_means(structure.across**2 + structure.down**2, grid)
     product = cell_means(structure.across * reference.across + structure.down * reference.down, grid)

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections import Counter, deque
 
 from tracking.detectors.base import Image
-from tracking.picture_condition.cover import Cells, CoverFinder
+from tracking.picture_condition.cover import CoverFinder
 from tracking.picture_condition.reference import Reference
 from tracking.picture_condition.stillness import StillnessMonitor, forget_before
-from tracking.picture_condition.structure import Structure, reduce, structure_of
+from tracking.picture_condition.structure import Cells, Structure, reduce, structure_of
 from tracking.types import PictureCondition
 
 # Seconds between the pictures that are looked at, and between those that enter the reference.

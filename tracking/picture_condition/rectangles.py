@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from tracking.boxes import BOX_SIDES, Floats
 from tracking.detectors.base import Mask
-from tracking.picture_condition.structure import grid_of
+from tracking.picture_condition.structure import PART_CELLS, Cells, grid_of
 
-Cells = npt.NDArray[np.bool_]
-
-_CELLS = 32
-"""Along the longer side of a picture."""
 _MOST = 0.5
 """Least share of a cell that belongs to the part."""
 
@@ -25,7 +20,7 @@ def cells_of(mask: Mask, grid: tuple[int, ...] | None = None) -> Cells:
         mask: of the whole picture, at any size.
         grid: rows and columns; None: those of its own size.
     """
-    rows, columns = grid_of(mask.shape, _CELLS) if grid is None else grid
+    rows, columns = grid_of(mask.shape, PART_CELLS) if grid is None else grid
     shares = cv2.resize(mask, (columns, rows), interpolation=cv2.INTER_AREA)
     return np.asarray(shares >= _MOST * np.iinfo(np.uint8).max)
 

@@ -9,12 +9,18 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import numpy.typing as npt
 
 from tracking.boxes import Floats
 from tracking.detectors.base import Image, Plane
 
 _SIDE = 320
 _CELLS = 16
+PART_CELLS = 32
+"""Cells along the longer side of a picture in which a part of it is told."""
+
+Cells = npt.NDArray[np.bool_]
+"""`(R, C)`."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -84,10 +84,7 @@ class ViewQualityBuffer:
 
     def clarity(self, camera: str, boxes: Floats) -> Floats:
         """Return how clear a camera's newest picture is in boxes (K, 4), (K,), from 0 to 1."""
-        covered, condition = self._covered[camera], self.conditions[camera]
-        if not covered or condition not in {"clear", "covered"}:
-            return np.full(len(boxes), float(condition == "clear"))
-        return 1.0 - _covered_shares(boxes[:, None], covered)
+        return _clarity(boxes[:, None], self.conditions[camera], self._covered[camera])
 
     def forget_before(self, pulse: int) -> None:
         """Drop the frames before a pulse."""
@@ -112,6 +109,9 @@ class ViewQualityBuffer:
     def _compute(self, windows: Sequence[CameraWindow], start: int) -> ViewQuality:
         """Compute the quality of all windows' tracks; frames outside a window count as hidden."""
         tracks = [track for window in windows for track in window.message.tracks]
+        clarity = [
+            _clarity(window.boxes, window.message.condition, window.message.covered) for window in windows
+        ]
         return compute_view_quality(
             TrackWindow(
                 _stacked_boxes(windows, start),
@@ -119,7 +119,7 @@ class ViewQualityBuffer:
                 np.clip(np.array([track.confidence for track in tracks], dtype=np.float64), 0.0, 1.0),
                 # None, not measured, becomes NaN.
                 np.array([track.sharpness for track in tracks], dtype=np.float64),
-                np.concatenate([np.empty(0), *map(_clarity, windows)]),
+                np.concatenate([np.empty(0), *clarity]),
             ),
             self.layout([window.message.camera for window in windows]),
             self.settings,
@@ -152,14 +152,11 @@ class ViewQualityBuffer:
         return moved_homography(np.asarray(homography @ to_camera), self._motion[camera])
 
 
-def _clarity(window: CameraWindow) -> Floats:
-    """Return how clear the picture is where each track's boxes are, (T,): 0 behind a cover."""
-    message = window.message
-    if not message.covered:
-        return np.full(len(window.keys), float(message.condition == "clear"))
-    if message.condition not in {"clear", "covered"}:
-        return np.zeros(len(window.keys))
-    return 1.0 - _covered_shares(window.boxes, message.covered)
+def _clarity(boxes: Floats, condition: PictureCondition, covered: PackedAreas) -> Floats:
+    """Return how clear a picture is where each track's boxes (T, F, 4) are, (T,): 0 behind a cover."""
+    if not covered or condition not in {"clear", "covered"}:
+        return np.full(len(boxes), float(condition == "clear"))
+    return 1.0 - _covered_shares(boxes, covered)
 
 
 def _covered_shares(boxes: Floats, covered: PackedAreas) -> Floats:
