@@ -32,7 +32,7 @@ from server.camera.sources.orientation import parse_orientation, pixel_aspect
 from server.camera.sources.stream_reader import OPEN_S, READ_S
 from server.media.nal_units import nal_units
 from server.system.address_redaction import ffmpeg_reason, redact_to_host
-from server.system.errors import UnavailableError, UserError
+from server.system.errors import UserError
 
 _CHECKED_GOPS = 2
 """GOPs to check before a camera counts as compatible."""
@@ -66,8 +66,6 @@ class PassthroughStream(LiveStream):
         self._frame_s = 1 / Fraction(required.fps).limit_denominator(1001)
         self._is_decodable = False
         """Whether no unit was lost since the last keyframe."""
-        self._misfit = ""
-        """Why the stream does not fit since the last connection; empty: it does."""
         self.current: PassthroughUnit | None = None
         super().__init__(url, options, listener)
 
@@ -77,9 +75,7 @@ class PassthroughStream(LiveStream):
         Raises:
             UnavailableError: its stream does not fit any more; the caller has to open the camera again.
         """
-        if misfit := self._misfit:
-            name = redact_to_host(self._url)
-            raise UnavailableError(f"{name}: its stream does not fit any more: {misfit}")
+        self._check_fit()
         with self._waiting_lock:
             self.current = unit = self._waiting.take(pulse)
         self.captured = None if unit is None else unit.captured
@@ -94,9 +90,8 @@ class PassthroughStream(LiveStream):
         try:
             CompatibilityCheck(self._required).check_video(opened)
         except IncompatibleStreamError as error:
-            self._misfit = str(error)
+            self._misfit = f"its stream does not fit any more: {error}"
             return False
-        self._misfit = ""
         decode_without_delay(opened)
         self._is_decodable, self._continuity = False, self._required.codec.continuity()
         return super()._accept(opened)

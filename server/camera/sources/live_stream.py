@@ -47,8 +47,8 @@ class LiveStream(StreamReader):
         self.size = self._orientation.size(self._stored)
         self._sized = threading.Event()
         """Set by the first frame; the size is fixed from then on."""
-        self._resized: tuple[int, int] | None = None
-        """The new size of its images, if it has changed."""
+        self._misfit = ""
+        """Why the stream of the newest connection does not fit what runs; empty: it does."""
         self._lock = threading.Lock()
         self._newest: VideoFrame | None = None
         self._newest_at = 0.0
@@ -68,8 +68,7 @@ class LiveStream(StreamReader):
                 homography, boxes and appearance models belong to the old size.
         """
         del pulse
-        if self._resized is not None:
-            raise UnavailableError(f"{redact_to_host(self._url)}: {self._size_message(self._resized)}")
+        self._check_fit()
         with self._lock:
             picture = self._newest if time.monotonic() - self._newest_at < _STALE_S else None
             self.captured = self._newest_captured
@@ -83,11 +82,13 @@ class LiveStream(StreamReader):
         """Prepare for a new connection; refuse one of another size."""
         aspect = pixel_aspect(opened.stream)
         size = replace(self._orientation, pixel_aspect=aspect).size(opened.size)
-        if size != self.size:
-            self._resized = size
-            return False
+        self._misfit = "" if size == self.size else self._size_message(size)
         self._silence = _Silence()
-        return True
+        return not self._misfit
+
+    def _check_fit(self) -> None:
+        if misfit := self._misfit:
+            raise UnavailableError(f"{redact_to_host(self._url)}: {misfit}")
 
     def _size_message(self, size: tuple[int, int]) -> str:
         return "its images are {}x{} now, they were {}x{}".format(*size, *self.size)

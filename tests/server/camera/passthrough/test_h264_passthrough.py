@@ -426,6 +426,32 @@ def test_audio_is_delayed_as_much_as_the_video(network: NetworkCamera) -> None:
     assert float(listener._shift or 0) == pytest.approx(delay / FPS, abs=0.02), "to within half a frame"
 
 
+def refusal_of(source: PassthroughStream) -> str:
+    """Wait until a camera is to be opened again, and return why."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        try:
+            source.take(-1)
+        except UnavailableError as error:
+            return str(error)
+        time.sleep(0.02)
+    raise AssertionError("it is not refused")
+
+
+def test_a_network_camera_that_returns_with_wider_pixels_is_to_be_opened_again(tmp_path: Path) -> None:
+    config = site("rtsp://camera", encode={"parameters": "own"})
+    path, wide = write_h264(tmp_path, "h264"), tmp_path / "wide.h264"
+    options = "-c copy -bsf:v h264_metadata=sample_aspect_ratio=2/1"
+    subprocess.run(f"ffmpeg -v error -i {path} {options} {wide}".split(), check=True)
+    source = PassthroughStream(str(path), {}, None, required_format(config))
+    try:
+        wide.replace(path)
+        refusal = refusal_of(source)
+    finally:
+        source.close()
+    assert refusal.endswith(f": its images are {2 * WIDTH}x{HEIGHT} now, they were {WIDTH}x{HEIGHT}")
+
+
 def test_a_network_camera_that_returns_with_another_size_is_to_be_opened_again(tmp_path: Path) -> None:
     config = site("rtsp://camera", encode={"parameters": "own"})
     larger = config.site.model_copy(update={"width": 2 * WIDTH, "height": 2 * HEIGHT})
@@ -438,14 +464,7 @@ def test_a_network_camera_that_returns_with_another_size_is_to_be_opened_again(t
     source = PassthroughStream(str(path), {}, None, required_format(config))
     (tmp_path / "other.h264").write_bytes(other)
     (tmp_path / "other.h264").replace(path)
-    end, refusal = time.monotonic() + PATIENCE, ""
-    while not refusal:
-        assert time.monotonic() < end
-        time.sleep(0.02)
-        try:
-            source.take(-1)
-        except UnavailableError as error:
-            refusal = str(error)
+    refusal, end = refusal_of(source), time.monotonic() + PATIENCE
     (tmp_path / "first.h264").write_bytes(first_part)
     (tmp_path / "first.h264").replace(path)
     while source._misfit:  # until it fits again

@@ -38,6 +38,8 @@ class MotionJpeg:
         self.frame, self.width = 0, WIDTH
         self.parts: int | None = None
         """After how many pictures it ends a connection."""
+        self.left = 0
+        """Connections that clients have ended."""
         self._unplugged = threading.Event()
         self._server: http.server.ThreadingHTTPServer | None = None
         self._thread: threading.Thread | None = None
@@ -59,6 +61,7 @@ class MotionJpeg:
                     try:
                         self.wfile.write(part + jpeg + b"\r\n")
                     except OSError:
+                        camera.left += 1
                         return
 
             def log_message(self, *_: object) -> None:
@@ -268,6 +271,24 @@ def test_a_change_of_the_picture_size_ends_the_camera(
             camera.plug_in(port)
         with pytest.raises(UnavailableError, match=r"its images are 128x48 now, they were 64x48$"):
             take_them_all()
+    finally:
+        source.close()
+
+
+def test_a_camera_that_has_its_earlier_size_again_is_shown(
+    camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without pulses nobody has asked meanwhile."""
+    monkeypatch.setattr(stream_reader, "_RETRY_FIRST_S", 0.05)
+    source = LiveStream(f"http://127.0.0.1:{camera.plug_in()}/", {})
+    try:
+        until(lambda: shown(source) == 0)
+        camera.width = 2 * WIDTH
+        until(lambda: camera.left >= 2)  # the connection in which it changes, and one that is refused
+        camera.frame, camera.width = 3, WIDTH
+        frames = source._newest
+        until(lambda: source._newest is not frames)
+        until(lambda: shown(source) == 3)
     finally:
         source.close()
 
