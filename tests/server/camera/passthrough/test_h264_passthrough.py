@@ -438,6 +438,7 @@ def refusal_of(source: PassthroughStream) -> str:
     raise AssertionError("it is not refused")
 
 
+@needs_ffmpeg
 def test_a_network_camera_that_returns_with_wider_pixels_is_to_be_opened_again(tmp_path: Path) -> None:
     config = site("rtsp://camera", encode={"parameters": "own"})
     path, wide = write_h264(tmp_path, "h264"), tmp_path / "wide.h264"
