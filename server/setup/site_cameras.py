@@ -19,7 +19,7 @@ from server.setup.site_file import (
     check_text,
     password_file,
     replace_file,
-    with_sent,
+    with_stream_comment,
     write_passwords,
 )
 from server.setup.site_pixels import Size
@@ -128,7 +128,7 @@ def readdress_camera(
         "cameras": [changed.entry if camera is earlier else camera for camera in cameras]
     }
     lists |= {"zones": changed.zones} if changed.zones != zones else {}
-    text = with_sent(_checked_text(path, lists), new)
+    text = with_stream_comment(_checked_text(path, lists), new)
     write_passwords([new], path)
     if ground is None or changed.ground == ground.content:
         replace_file(text, path)

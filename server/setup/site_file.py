@@ -151,8 +151,8 @@ def _camera_text(camera: NewCamera, path: Path) -> str:
     return lines
 
 
-def with_sent(text: str, camera: NewCamera) -> str:
-    """Return a text with what a camera sends now beside its source, if set-up has written that there."""
+def with_stream_comment(text: str, camera: NewCamera) -> str:
+    """Return a text in which set-up's comment beside a camera's source, if any, says what it sends now."""
     source = re.escape(_scalar(camera.address.source))
     written = rf"(?m)^(.*\bsource: {source} +# )\S+ \d+x\d+(, \S+ fps)?$"
     return re.sub(written, lambda match: f"{match[1]}{camera.sends}", text)

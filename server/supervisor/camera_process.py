@@ -64,7 +64,7 @@ class _Attempts:
 
     def __init__(self, camera_id: str, restart: asyncio.Event) -> None:
         self._id, self.restart = camera_id, restart
-        self._failures, self._changes = LogThrottle(quiet_s=0.0), LogThrottle()
+        self._failures, self._reopenings = LogThrottle(quiet_s=0.0), LogThrottle()
         self._backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
 
     async def failed(self, error: UserError) -> None:
@@ -78,11 +78,11 @@ class _Attempts:
         if ended := self._failures.end():
             log.info("camera %s is available, after %.0f s", self._id, ended.seconds)
 
-    async def changed(self, error: UnavailableError, ran_s: float) -> None:
+    async def must_reopen(self, error: UnavailableError, ran_s: float) -> None:
         """Record that it must be opened again after some seconds, and wait before that."""
         if ran_s >= _STABLE_S:
             self._backoff.reset()
-        if (more := self._changes.record(str(error))) is not None:
+        if (more := self._reopenings.record(str(error))) is not None:
             log.warning("camera %s: %s%s; opening it again", self._id, error, more)
         await self._wait()
 
@@ -137,7 +137,7 @@ async def _run(camera: CameraProcess, attempts: _Attempts) -> bool:
             attempts.settings_changed()
         return run.done()
     except UnavailableError as error:  # what the camera sends has changed
-        await attempts.changed(error, loop.time() - began)
+        await attempts.must_reopen(error, loop.time() - began)
         return False
     finally:
         for task in (run, waiting):

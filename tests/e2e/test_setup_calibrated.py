@@ -46,10 +46,10 @@ async def test_three_found_cameras_become_a_calibrated_site_whose_floor_shows_pe
     pytest.importorskip("onvif", reason="needs onvif-zeep-async: the extra onvif")
     with room_cameras() as discovery:
         async with set_up(tmp_path, discovery) as run, chromium() as browser:
-            page = await new_page(browser, bypass_csp=True)
+            page, site = await new_page(browser, bypass_csp=True), run.url.partition("#")[0]
             await add_found_cameras(page, run.url)
             await write_and_watch(page, "hall")
-            await page.goto(run.url.partition("#")[0] + "operator#calibration-points")
+            await page.goto(f"{site}operator#calibration-points")
             await mark_places(page)
             await page.get_by_role("button", name="Calibrate", exact=True).click()
             await expect(page.locator("#points-lines li")).to_have_count(len(NAMES))
@@ -57,10 +57,10 @@ async def test_three_found_cameras_become_a_calibrated_site_whose_floor_shows_pe
             await expect(page.locator("#points-state")).to_contain_text("Written into the configuration")
             await page.get_by_role("button", name="Restart the site").click()
             await expect(page.locator("#restart-state")).to_contain_text("The site restarts")
-            await page.goto(run.url.partition("#")[0] + "operator#floor")
+            await page.goto(f"{site}operator#floor")
             await expect(page.locator("#plan polygon")).to_have_count(len(NAMES), timeout=PATIENCE_MS)
             await expect(page.locator("#positions li").first).to_contain_text("seen by", timeout=PATIENCE_MS)
-            await page.goto(run.url.partition("#")[0])
+            await page.goto(site)
             await page.wait_for_function(WATCHED, timeout=PATIENCE_MS, polling=2000)
             await page.close()
     for number, camera in enumerate(load_config(tmp_path / "site.yaml").cameras):

@@ -17,7 +17,7 @@ from tracking.detectors.base import Image, Plane
 _SIDE = 320
 _CELLS = 16
 PART_CELLS = 32
-"""Cells along the longer side of a picture in which a part of it is told."""
+"""Cells along the longer side of a picture by which a part of it is described."""
 
 Cells = npt.NDArray[np.bool_]
 """`(R, C)`."""

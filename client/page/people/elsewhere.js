@@ -54,8 +54,8 @@ export class PeopleElsewhere {
  * @param {Elsewhere} person
  * @returns {string | null} the address of the page there with this person; null: this page has them
  */
-function addressOf({ object, server, site, visible }) {
-  if (!(site || typeof visible === 'boolean') || !server || !URL.canParse(server)) return null;
+function addressOf({ object, server, visible }) {
+  if (typeof visible !== 'boolean' || !server || !URL.canParse(server)) return null;
   const address = new URL(server);
   if (!['http:', 'https:'].includes(address.protocol)) return null;
   address.searchParams.set('object', String(object));
@@ -65,5 +65,6 @@ function addressOf({ object, server, site, visible }) {
 /** @param {Elsewhere & {address: string}} person */
 function item({ object, site, visible, address }) {
   const link = make('a', { href: address, textContent: `Person ${object}` });
-  return make('li', {}, link, site ? (visible ? ` at ${site}` : ` left ${site}`) : visible ? ' in another area' : ' was in another area');
+  const place = site ? `${visible ? 'at' : 'left'} ${site}` : `${visible ? 'in' : 'was in'} another area`;
+  return make('li', {}, link, ` ${place}`);
 }
