@@ -22,7 +22,8 @@ from server.http.access.session_routes import SessionInfo, SignIn
 from server.http.access.sessions import SESSION_LIFETIME_S
 from server.http.app_keys import SETUP
 from server.http.error_responses import FAILURES, answer_errors, note_begun
-from server.http.json_responses import error_response, json_response, read_json
+from server.http.json_requests import json_body
+from server.http.json_responses import error_response, json_response
 from server.http.operator import camera_search, setup, trials
 from server.http.operator.trials import add_trials
 from server.setup.session import SetupSession
@@ -80,8 +81,9 @@ async def _get_session(request: web.Request) -> web.StreamResponse:
 
 
 @_routes.post(SESSION_PATH)
-async def _post_session(request: web.Request) -> web.StreamResponse:
-    cookie = request.app[_ACCESS].redeem((await read_json(request, SignIn)).token.strip())
+@json_body(SignIn)
+async def _post_session(request: web.Request, sign_in: SignIn) -> web.StreamResponse:
+    cookie = request.app[_ACCESS].redeem(sign_in.token.strip())
     if cookie is None:
         return error_response(401, _NEEDS_TOKEN)
     response = json_response(_SESSION)

@@ -24,12 +24,17 @@ def check_csrf(request: web.Request) -> web.Response | None:
         return error_response(403, "pages of other origins may not use this address")
     if request.headers.get("Sec-Fetch-Site", "none") not in {"none", "same-origin"}:
         return error_response(403, "requests from pages of other sites are refused here")
-    if request.method not in {"GET", "HEAD"} and CSRF_HEADER not in request.headers:
+    if needs_csrf_header(request.method, route_pattern(request)) and CSRF_HEADER not in request.headers:
         return error_response(
             403,
             f"{request.method} needs the header {CSRF_HEADER}: 1, which other sites' pages cannot send",
         )
     return None
+
+
+def needs_csrf_header(method: str, path: str) -> bool:
+    """Return whether a request to this route changes something that is protected."""
+    return _is_protected(path) and method not in {"GET", "HEAD", "OPTIONS"}
 
 
 async def remove_cors_header(request: web.Request, response: web.StreamResponse) -> None:

@@ -8,7 +8,8 @@ from aiohttp import web
 from server.http.access.authorization import ACCESS, AccessControl
 from server.http.access.permissions import SESSION_PATH, Grant
 from server.http.access.sessions import SESSION_LIFETIME_S
-from server.http.json_responses import error_response, json_response, read_json
+from server.http.json_requests import json_body
+from server.http.json_responses import error_response, json_response
 
 routes = web.RouteTableDef()
 
@@ -42,13 +43,13 @@ async def get_session(request: web.Request) -> web.Response:
 
 
 @routes.post(SESSION_PATH)
-async def post_session(request: web.Request) -> web.StreamResponse:
+@json_body(SignIn)
+async def post_session(request: web.Request, sign_in: SignIn) -> web.StreamResponse:
     """Sign in."""
     access = request.app[ACCESS]
     authenticator = access.authenticator
     if not access.needs_token:
         return error_response(400, "there are no tokens (access.tokens), so signing in is not needed")
-    sign_in = await read_json(request, SignIn)
     credential = authenticator.check_token(request, sign_in.token.strip())
     if isinstance(credential, web.Response):
         return credential

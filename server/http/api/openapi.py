@@ -12,100 +12,30 @@ from typing import Any
 import msgspec
 from aiohttp import web
 
-from server.http.access.permissions import Permission, permission_for
-from server.http.access.session_routes import SessionInfo
+from server.http.access.csrf import CSRF_HEADER, needs_csrf_header
+from server.http.api.openapi_responses import (
+    DELETION,
+    JSON_ANSWERS,
+    MEDIA_TYPES,
+    RECORDED_SPANS,
+    SEARCH,
+    components_of,
+    json_content,
+    responses_of,
+)
 from server.http.api.past_search import PAST_SEARCH_QUERIES
-from server.http.api.schema import Cameras, Delays, FlagList, Objects, Past, SiteInfo
-from server.http.json_responses import Problem
-from server.http.operator.schema import OPERATOR, OPERATOR_FILES, OPERATOR_RESULTS, TrialProgress
+from server.http.json_requests import body_kind
+from server.http.operator.deletion import DELETION_QUERIES
+from server.http.operator.schema import OPERATOR_FILES
 from server.http.streams.request_validation import CAMERA_QUERY, DELAY, OVERLAY, TIME_SHIFT, TRANSCODED
-from server.service.facade.past_search import PastSearchResult
-from server.service.facade.rules import Rules
 from server.service.facade.streams import DelayMode
-from server.service.facade.view_selection import ViewSelection
 
 routes = web.RouteTableDef()
 
-_SEARCH = "/api/past/search"
-_DELETION = "/api/operator/deletion"
-
-_JSON: dict[str, type[msgspec.Struct]] = {
-    "/api/site": SiteInfo,
-    "/api/session": SessionInfo,
-    "/api/delays": Delays,
-    "/api/objects": Objects,
-    "/api/cameras": Cameras,
-    "/api/flags": FlagList,
-    "/api/rules": Rules,
-    _SEARCH: PastSearchResult,
-    "/api/objects/{object}/choice": ViewSelection,
-    "/api/objects/{object}/past": Past,
-    "/api/cameras/{camera}/past": Past,
-    **OPERATOR,
+_REQUIRED_QUERIES = {
+    **{("GET", path): "from" for path in ("/api/past", SEARCH, *OPERATOR_FILES)},
+    ("GET", DELETION): "object",
 }
-_MEDIA_TYPES = {
-    "/objects/{object}/best.mp4": "video/mp4",
-    "/cameras/{camera}/live.mp4": "video/mp4",
-    "/objects/{object}/best.webm": "video/webm",
-    "/cameras/{camera}/live.webm": "video/webm",
-    "/objects/{object}/best.ts": "video/mp2t",
-    "/cameras/{camera}/live.ts": "video/mp2t",
-    "/objects/{object}/hls/index.m3u8": "application/vnd.apple.mpegurl",
-    "/objects/{object}/hls/init.mp4": "video/mp4",
-    "/objects/{object}/hls/{segment}.m4s": "video/mp4",
-    "/objects/{object}/hls/{segment}.{part}.m4s": "video/mp4",
-    "/cameras/{camera}/hls/index.m3u8": "application/vnd.apple.mpegurl",
-    "/cameras/{camera}/hls/init.mp4": "video/mp4",
-    "/cameras/{camera}/hls/{segment}.m4s": "video/mp4",
-    "/cameras/{camera}/hls/{segment}.{part}.m4s": "video/mp4",
-    "/objects/{object}/best.mjpeg": "multipart/x-mixed-replace",
-    "/cameras/{camera}/live.mjpeg": "multipart/x-mixed-replace",
-    "/objects/{object}/best.jpg": "image/jpeg",
-    "/cameras/{camera}/live.jpg": "image/jpeg",
-    "/objects/{object}/thumb.jpg": "image/jpeg",
-    "/objects/{object}/whep": "application/sdp",
-    "/cameras/{camera}/whep": "application/sdp",
-    "/objects/{object}/whep/{session}": "application/sdp",
-    "/cameras/{camera}/whep/{session}": "application/sdp",
-    "/api/events": "text/event-stream",
-    "/api/events/{event}/picture.jpg": "image/jpeg",
-    "/api/past": "application/x-ndjson",
-    "/healthz": "text/plain",
-    "/readyz": "text/plain",
-    "/metrics": "text/plain",
-    **OPERATOR_FILES,
-    **OPERATOR_RESULTS,
-}
-_UNAVAILABLE = {
-    "/objects/{object}/best.mp4",
-    "/cameras/{camera}/live.mp4",
-    "/readyz",
-    "/api/events",
-    "/api/past",
-    _SEARCH,
-} | {
-    path
-    for path in _MEDIA_TYPES
-    if path.endswith((".webm", ".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
-}
-_MAY_BE_UNAVAILABLE_FOR_OPERATORS = {
-    "/api/operator/people",
-    "/api/operator/position_corrections",
-    _DELETION,
-}
-_NO_FILE = "The site has no configuration file, or refuses the change."
-_CONFLICTS = {
-    "/api/operator/site_cameras": _NO_FILE,
-    "/api/operator/site_settings": _NO_FILE,
-    "/api/operator/marked_points": _NO_FILE,
-    "/api/operator/zones": _NO_FILE,
-    _DELETION: "Another deletion is not complete yet.",
-    _SEARCH: "The zone is on the floor, and no camera is calibrated.",
-}
-_TRIES = {("POST", "/api/operator/site_cameras"), ("POST", "/api/operator/setup/streams")}
-"""Operations that speak to a camera, for as long as that takes."""
-_FROM_REQUIRED = {"/api/past", _SEARCH, *OPERATOR_FILES}
-_RECORDED_SPANS = {"/api/objects/{object}/past", "/api/cameras/{camera}/past"}
 _MOMENT = {"type": "string", "examples": ["-60", "p1250", "2026-11-21T16:13:36Z"]}
 _SCHEMAS: dict[str, Any] = {
     "object": {"type": "integer", "minimum": 0},
@@ -134,7 +64,6 @@ _SCHEMAS: dict[str, Any] = {
         **_MOMENT,
         "description": "Within the last minute, and after the first request for this object.",
     },
-    "camera_query": {"type": "string", "description": "Show this camera instead of the best one."},
     "prefer": {
         "type": "string",
         "description": "Show this camera while it sees the person.",
@@ -169,97 +98,71 @@ DESCRIPTION = web.AppKey("API description", ApiDescription)
 
 def describe(app: web.Application) -> dict[str, Any]:
     """Build the OpenAPI document of an application's routes."""
-    _, components = msgspec.json.schema_components(
-        [*_JSON.values(), Problem], ref_template="#/components/schemas/{name}"
-    )
+    routes = [
+        (route.resource.canonical, route)
+        for route in app.router.routes()
+        if route.method != "HEAD" and route.resource is not None
+    ]
+    documented = [(path, route) for path, route in routes if path in JSON_ANSWERS or path in MEDIA_TYPES]
+    bodies = [body_kind(route.handler) for _, route in documented]
     paths: dict[str, dict[str, Any]] = {}
-    for route in app.router.routes():
-        if route.method == "HEAD" or route.resource is None:
-            continue
-        path = route.resource.canonical
-        if path in _JSON or path in _MEDIA_TYPES:
-            operation = _operation(path, inspect.getdoc(route.handler) or "", route.method)
-            paths.setdefault(path, {})[route.method.lower()] = operation
+    for (path, route), body in zip(documented, bodies, strict=True):
+        operation = _operation(path, inspect.getdoc(route.handler) or "", route.method, body)
+        paths.setdefault(path, {})[route.method.lower()] = operation
     return {
         "openapi": "3.1.0",
         "info": {"title": "MyView", "version": version("myview")},
         "paths": dict(sorted(paths.items())),
-        "components": {"schemas": components},
+        "components": {"schemas": components_of([body for body in bodies if body is not None])},
     }
 
 
-def _json_content(struct: type[msgspec.Struct]) -> dict[str, Any]:
-    return {"application/json": {"schema": {"$ref": f"#/components/schemas/{struct.__name__}"}}}
+def _operation(path: str, summary: str, method: str, body: Any) -> dict[str, Any]:
+    operation: dict[str, Any] = {
+        "summary": summary.splitlines()[0],
+        "parameters": _parameters(path, method),
+        "responses": responses_of(path, method, has_json_body=body is not None),
+    }
+    if body is not None:
+        operation["requestBody"] = {"required": True, "content": json_content(body)}
+    elif method == "POST" and path.endswith("/whep"):
+        offer = {"application/sdp": {"schema": {"type": "string"}}}
+        operation["requestBody"] = {"required": True, "content": offer}
+    return operation
 
 
-def _operation(path: str, summary: str, method: str) -> dict[str, Any]:
-    content = _json_content(_JSON[path]) if path in _JSON else {_MEDIA_TYPES[path]: {}}
-    error = _json_content(Problem)
-    responses: dict[str, Any] = _success(path, content, error)
-    if (method, path) in _TRIES:
-        description = "It takes longer: ask /api/operator/setup/trials/{key} for the result."
-        responses["202"] = {"description": description, "content": _json_content(TrialProgress)}
-    names = re.findall(r"\{(\w+)\}", path)
-    if names or path in OPERATOR_RESULTS or path in {_SEARCH, _DELETION}:
-        responses["404"] = {"description": "No object, camera or file of this name.", "content": error}
-    if path in OVERLAY | TIME_SHIFT | CAMERA_QUERY | DELAY | _RECORDED_SPANS or path.endswith("/choice"):
-        responses["400"] = {"description": "Invalid query.", "content": error}
-    if path in OPERATOR.keys() | OPERATOR_FILES.keys() | OPERATOR_RESULTS.keys() | {_SEARCH}:
-        responses["400"] = {"description": "Invalid request.", "content": error}
-    if permission_for("GET", path) is not Permission.PUBLIC:
-        responses["401"] = {
-            "description": "No valid token, where the site has tokens.",
-            "content": error,
-        }
-        responses["403"] = {"description": "Outside the token's scope.", "content": error}
-        responses["429"] = {"description": "Too many wrong tokens; try again later.", "content": error}
-    if path in _CONFLICTS:
-        responses["409"] = {"description": _CONFLICTS[path], "content": error}
-    if path in TIME_SHIFT | OPERATOR_FILES.keys():
-        responses["416"] = {"description": "That time is not recorded.", "content": error}
-    if path in _UNAVAILABLE | _MAY_BE_UNAVAILABLE_FOR_OPERATORS | _RECORDED_SPANS or "object" in names:
-        responses["503"] = {"description": "Temporarily unavailable; try again later."}
-    parameters = [{"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]} for name in names]
-    queries = ["prefer"] * (path in CAMERA_QUERY) + ["delay"] * (path in DELAY)
-    queries += ["codec"] * (path in TRANSCODED)
-    queries += ["overlay"] * (path in OVERLAY) + ["fps"] * path.endswith(".mjpeg")
-    queries += ["from", "to"] * (path in TIME_SHIFT | _RECORDED_SPANS | OPERATOR_FILES.keys())
-    queries += ["from", "to", *PAST_SEARCH_QUERIES] * (path == _SEARCH)
-    queries += ["at"] * path.endswith("/choice")
-    queries += ["_HLS_msn", "_HLS_part"] * path.endswith(".m3u8")
-    if path in CAMERA_QUERY:
-        parameters.append(
-            {"name": "camera", "in": "query", "required": False, "schema": _SCHEMAS["camera_query"]}
-        )
-    schemas = _SCHEMAS | (PAST_SEARCH_QUERIES if path == _SEARCH else {})
-    parameters += [
-        {
-            "name": name,
-            "in": "query",
-            "required": path in _FROM_REQUIRED and name == "from",
-            "schema": schemas[name],
-        }
-        for name in queries
+def _parameters(path: str, method: str) -> list[dict[str, Any]]:
+    """Return the parameters in an operation's path, query and header."""
+    parameters = [
+        {"name": name, "in": "path", "required": True, "schema": _SCHEMAS[name]}
+        for name in re.findall(r"\{(\w+)\}", path)
     ]
-    return {"summary": summary.splitlines()[0], "parameters": parameters, "responses": responses}
+    required = _REQUIRED_QUERIES.get((method, path))
+    parameters += [
+        {"name": name, "in": "query", "required": name == required, "schema": schema}
+        for name, schema in _queries(path, method).items()
+    ]
+    if needs_csrf_header(method, path):
+        parameters.append({"name": CSRF_HEADER, "in": "header", "required": True, "schema": {"const": "1"}})
+    return parameters
 
 
-def _success(path: str, content: Any, error: Any) -> dict[str, Any]:
-    """Return the responses to a valid request, and WHEP's errors."""
-    if path.endswith("/trials/{key}"):
-        return {
-            "200": {"description": "What the request that began it answers.", "content": {}},
-            "202": {"description": "It has no result yet.", "content": content},
-        }
-    if not path.endswith("/whep"):
-        return {"200": {"description": "OK", "content": content}}
-    return {
-        "201": {"description": "The SDP answer; Location is the session's address.", "content": content},
-        "400": {"description": "The SDP offer is invalid, or has no H.264.", "content": error},
-        "415": {"description": "Not application/sdp.", "content": error},
-        "501": {"description": "The extra webrtc is not installed.", "content": error},
-        "503": {"description": "Temporarily unavailable; try again later."},
-    }
+def _queries(path: str, method: str) -> dict[str, Any]:
+    """Return the schemas of an operation's queries by name."""
+    names = ["prefer"] * (path in CAMERA_QUERY) + ["delay"] * (path in DELAY)
+    names += ["codec"] * (path in TRANSCODED)
+    names += ["overlay"] * (path in OVERLAY) + ["fps"] * path.endswith(".mjpeg")
+    names += ["from", "to"] * (path in TIME_SHIFT | RECORDED_SPANS | OPERATOR_FILES.keys() | {SEARCH})
+    names += ["at"] * path.endswith("/choice")
+    names += ["_HLS_msn", "_HLS_part"] * path.endswith(".m3u8")
+    queries = {name: _SCHEMAS[name] for name in names}
+    if path in CAMERA_QUERY:
+        queries["camera"] = {"type": "string", "description": "Show this camera instead of the best one."}
+    if path == SEARCH:
+        queries |= PAST_SEARCH_QUERIES
+    if (method, path) == ("GET", DELETION):
+        queries |= DELETION_QUERIES
+    return queries
 
 
 @routes.get("/api/openapi.json")
@@ -275,7 +178,7 @@ async def get_readable(request: web.Request) -> web.Response:
         f"<tr><td><code>{method.upper()} {html.escape(path)}</code></td>"
         f"<td>{html.escape(operation['summary'])}</td></tr>"
         for path, item in request.app[DESCRIPTION].document["paths"].items()
-        for method, operation in [next(iter(item.items()))]
+        for method, operation in item.items()
     )
     page = (
         "<!doctype html><html lang=en><meta charset=utf-8><title>MyView: the API</title>"

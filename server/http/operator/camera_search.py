@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Awaitable, Callable
 from typing import Annotated
 
@@ -10,7 +11,8 @@ from aiohttp import web
 
 from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import SETUP
-from server.http.json_responses import error_response, json_response, read_json
+from server.http.json_requests import json_body
+from server.http.json_responses import error_response, json_response
 from server.http.operator.schema import OfferedStream, OfferedStreams, SearchedCamera, SearchResult
 from server.http.operator.trials import follow
 from server.setup.camera_address import CameraAddresses, parse_addresses
@@ -63,13 +65,13 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 def answers_user_errors(handler: Handler) -> Handler:
     """Answer 400 with the line of a UserError."""
 
+    @functools.wraps(handler)
     async def answer(request: web.Request) -> web.StreamResponse:
         try:
             return await handler(request)
         except UserError as error:
             return error_response(400, str(error))
 
-    answer.__doc__ = handler.__doc__
     return answer
 
 
@@ -83,9 +85,10 @@ async def post_search(request: web.Request) -> web.StreamResponse:
 
 
 @routes.post(f"{_PATH}/streams")
-async def post_streams(request: web.Request) -> web.StreamResponse:
+@json_body(StreamsQuery)
+async def post_streams(request: web.Request, query: StreamsQuery) -> web.StreamResponse:
     """Ask a found camera for its streams."""
-    return await follow(request, _streams(request.app[SETUP], await read_json(request, StreamsQuery)))
+    return await follow(request, _streams(request.app[SETUP], query))
 
 
 async def _streams(session: SetupSession, query: StreamsQuery) -> web.Response:

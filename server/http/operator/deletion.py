@@ -10,7 +10,8 @@ from aiohttp import web
 
 from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import SERVICE
-from server.http.json_responses import json_response, read_json
+from server.http.json_requests import json_body
+from server.http.json_responses import json_response
 from server.messaging.camera_identity_snapshot import PERSON_NUMBER_MAX
 from server.service.facade.deletion import DeletePerson, Recordings
 from server.service.facade.errors import InvalidCommandError
@@ -20,6 +21,11 @@ routes = web.RouteTableDef()
 _RUN_MAX = 64
 _NUMBER = re.compile(r"[1-9][0-9]{0,8}")
 _Number = Annotated[int, msgspec.Meta(ge=1, le=PERSON_NUMBER_MAX)]
+
+DELETION_QUERIES = {
+    "object": {"type": "integer", "minimum": 1, "maximum": PERSON_NUMBER_MAX},
+    "run": {"type": "string", "maxLength": _RUN_MAX, "description": "As in DeletionRequest."},
+}
 
 
 class DeletionRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -47,8 +53,8 @@ async def get_deletion(request: web.Request) -> web.Response:
 
 
 @routes.post(f"{OPERATOR_PATH}/deletion")
-async def post_deletion(request: web.Request) -> web.Response:
+@json_body(DeletionRequest)
+async def post_deletion(request: web.Request, asked: DeletionRequest) -> web.Response:
     """Delete a person's data, for good."""
-    asked = await read_json(request, DeletionRequest)
     command = DeletePerson(asked.object, asked.recordings, asked.run)
     return json_response(await request.app[SERVICE].deletion.delete(command))

@@ -11,7 +11,8 @@ from aiohttp import web
 
 from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import CONTROL, SERVICE
-from server.http.json_responses import error_response, json_response, read_json
+from server.http.json_requests import json_body
+from server.http.json_responses import error_response, json_response
 from server.http.operator.config_file import change_config, config_path
 from server.http.operator.schema import MarkedPointsStatus, PointError, PointsResult
 from server.setup.marked_points import (
@@ -49,9 +50,9 @@ async def get_marked_points(request: web.Request) -> web.Response:
 
 
 @routes.post(_PATH)
-async def post_marked_points(request: web.Request) -> web.Response:
+@json_body(PointsCommand)
+async def post_marked_points(request: web.Request, command: PointsCommand) -> web.Response:
     """Calibrate from points, which changes nothing, or write that into the configuration."""
-    command = await read_json(request, PointsCommand)
     try:
         if command.action == "apply":
             apply = partial(apply_points, content=command.points, digest=command.digest)

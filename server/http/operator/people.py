@@ -7,7 +7,8 @@ from aiohttp import web
 
 from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import SERVICE
-from server.http.json_responses import error_response, json_response, read_json
+from server.http.json_requests import json_body
+from server.http.json_responses import error_response, json_response
 from server.http.operator.schema import IdentityOverrides
 from server.service.facade.people import MergePeople, RenamePerson, SplitPerson
 from server.service.service import BestViewService
@@ -33,11 +34,11 @@ async def get_overrides(request: web.Request) -> web.Response:
 
 
 @routes.post(f"{OPERATOR_PATH}/people")
-async def post_overrides(request: web.Request) -> web.Response:
+@json_body(PersonEdit)
+async def post_overrides(request: web.Request, edit: PersonEdit) -> web.Response:
     """Apply a manual override: rename a person, merge two people, or split one."""
     service = request.app[SERVICE]
     people = service.people
-    edit = await read_json(request, PersonEdit)
     people.check_editable(edit.object)
     if sum(getattr(edit, field) is not None for field in ("name", "merge", "split")) != 1:
         return error_response(400, "set exactly one of name, merge and split")

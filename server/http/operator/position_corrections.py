@@ -9,7 +9,8 @@ from aiohttp import web
 
 from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import SERVICE
-from server.http.json_responses import json_response, read_json
+from server.http.json_requests import json_body
+from server.http.json_responses import json_response
 from server.http.operator.schema import CorrectionStatus
 from server.messaging.number_types import Pulse
 from server.service.facade.assist import CORRECTIONS_MAX, CorrectionResult, CorrectPositions, OperatorPosition
@@ -45,10 +46,10 @@ async def get_position_corrections(request: web.Request) -> web.Response:
 
 
 @routes.post(_PATH)
-async def post_position_corrections(request: web.Request) -> web.Response:
+@json_body(CorrectionsBody)
+async def post_position_corrections(request: web.Request, body: CorrectionsBody) -> web.Response:
     """Correct a person's position in a camera's picture, now or in the past; its tracker uses it."""
     service = request.app[SERVICE]
-    body = await read_json(request, CorrectionsBody)
     positions = [
         OperatorPosition(correction.pulse, correction.x, correction.y, correction.tolerance)
         for correction in body.corrections

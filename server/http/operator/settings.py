@@ -17,7 +17,8 @@ from server.config.site_config import Config
 from server.config.yaml_file import dump_yaml, dump_yaml_inline
 from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import ON_DISK, SERVICE
-from server.http.json_responses import error_response, json_response, read_json
+from server.http.json_requests import json_body
+from server.http.json_responses import error_response, json_response
 from server.http.operator.schema import SelectionSettings, Setting, Settings
 from server.service.service import BestViewService
 from server.system.address_redaction import HIDDEN, redact_to_host, redact_zenoh_endpoint
@@ -49,11 +50,11 @@ async def get_view_selection_settings(request: web.Request) -> web.Response:
 
 
 @routes.put(f"{OPERATOR_PATH}/view_selection")
-async def put_view_selection_settings(request: web.Request) -> web.Response:
+@json_body(dict[str, float | bool])
+async def put_view_selection_settings(request: web.Request, changes: dict[str, float | bool]) -> web.Response:
     """Change view-selection settings until they are changed again or the service ends."""
     service = request.app[SERVICE]
     operations = service.operations
-    changes = await read_json(request, dict[str, float | bool])
     current = _flat(operations.view_settings)
     for key in changes:
         if key not in current:

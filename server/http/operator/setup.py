@@ -7,7 +7,8 @@ from aiohttp import web
 
 from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import SETUP
-from server.http.json_responses import json_response, read_json
+from server.http.json_requests import json_body
+from server.http.json_responses import json_response
 from server.http.operator.camera_search import CameraTrial, Name, answers_user_errors
 from server.http.operator.trials import follow
 from server.setup.proposal import SiteProposal
@@ -78,17 +79,19 @@ async def get_setup(request: web.Request) -> web.Response:
 
 
 @routes.post(f"{_PATH}/cameras")
-async def post_camera(request: web.Request) -> web.StreamResponse:
+@json_body(CameraTrial)
+async def post_camera(request: web.Request, trial: CameraTrial) -> web.StreamResponse:
     """Try a camera, and add it if it sends pictures."""
-    return await follow(request, _add(request.app[SETUP], await read_json(request, CameraTrial)))
+    return await follow(request, _add(request.app[SETUP], trial))
 
 
 @routes.put(f"{_PATH}/cameras/{{key:[0-9]{{1,9}}}}")
 @answers_user_errors
-async def put_camera(request: web.Request) -> web.StreamResponse:
+@json_body(CameraName)
+async def put_camera(request: web.Request, wanted: CameraName) -> web.StreamResponse:
     """Rename a camera that was added."""
     session = request.app[SETUP]
-    session.rename(int(request.match_info["key"]), (await read_json(request, CameraName)).name)
+    session.rename(int(request.match_info["key"]), wanted.name)
     return json_response(_state(session))
 
 
@@ -112,10 +115,10 @@ async def get_picture(request: web.Request) -> web.StreamResponse:
 
 @routes.post(f"{_PATH}/site")
 @answers_user_errors
-async def post_site(request: web.Request) -> web.StreamResponse:
+@json_body(SiteChoice)
+async def post_site(request: web.Request, choice: SiteChoice) -> web.StreamResponse:
     """Write the configuration."""
     session = request.app[SETUP]
-    choice = await read_json(request, SiteChoice)
     session.write(choice.name, SiteProposal(choice.fps, choice.width, choice.height))
     kept = None if session.kept is None else str(session.kept)
     return json_response(WrittenSite(str(session.path), kept))

@@ -11,7 +11,8 @@ from aiohttp import web
 
 from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import SERVICE, SETUP
-from server.http.json_responses import error_response, json_response, read_json
+from server.http.json_requests import json_body
+from server.http.json_responses import error_response, json_response
 from server.http.operator.camera_search import CameraTrial, Name
 from server.http.operator.config_file import change_config, config_path
 from server.http.operator.schema import SiteCamera, SiteCameras
@@ -58,9 +59,10 @@ async def get_site_cameras(request: web.Request) -> web.Response:
 
 
 @routes.post(_PATH)
-async def post_site_camera(request: web.Request) -> web.Response:
+@json_body(CameraToAdd)
+async def post_site_camera(request: web.Request, wanted: CameraToAdd) -> web.Response:
     """Try a camera; if it sends pictures, add it to the file, or give another one its address."""
-    return await follow(request, _try(request, await read_json(request, CameraToAdd)))
+    return await follow(request, _try(request, wanted))
 
 
 async def _try(request: web.Request, wanted: CameraToAdd) -> web.Response:
@@ -79,16 +81,16 @@ async def _try(request: web.Request, wanted: CameraToAdd) -> web.Response:
 
 
 @routes.put(_PATH)
-async def put_site_camera(request: web.Request) -> web.Response:
+@json_body(CameraToRename)
+async def put_site_camera(request: web.Request, wanted: CameraToRename) -> web.Response:
     """Rename a camera in the configuration file."""
-    wanted = await read_json(request, CameraToRename)
     return await _answer(request, lambda path: rename_camera(path, wanted.camera, wanted.name))
 
 
 @routes.delete(_PATH)
-async def delete_site_camera(request: web.Request) -> web.Response:
+@json_body(CameraToRemove)
+async def delete_site_camera(request: web.Request, wanted: CameraToRemove) -> web.Response:
     """Remove a camera from the configuration file."""
-    wanted = await read_json(request, CameraToRemove)
     return await _answer(request, lambda path: remove_camera(path, wanted.camera))
 
 

@@ -10,7 +10,8 @@ from pathlib import Path
 from aiohttp import web
 
 from server.http.access.permissions import OPERATOR_PATH
-from server.http.json_responses import error_response, json_response, read_json
+from server.http.json_requests import json_body
+from server.http.json_responses import error_response, json_response
 from server.http.operator.config_file import change_config, config_path
 from server.http.operator.marked_points import picture_sizes
 from server.http.operator.schema import SiteFormat
@@ -37,9 +38,9 @@ async def get_site_settings(request: web.Request) -> web.Response:
 
 
 @routes.put(_PATH)
-async def put_site_settings(request: web.Request) -> web.Response:
+@json_body(SiteChange)
+async def put_site_settings(request: web.Request, wanted: SiteChange) -> web.Response:
     """Change the site's name, rate and size in the configuration file; a restart brings them into force."""
-    wanted = await read_json(request, SiteChange)
     choice = StreamFormatChoice(wanted.name, wanted.fps, wanted.width, wanted.height)
     pictures = picture_sizes(request)
     return await _answer(

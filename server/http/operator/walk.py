@@ -10,7 +10,8 @@ from aiohttp import web
 
 from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import SERVICE
-from server.http.json_responses import error_response, json_response, read_json
+from server.http.json_requests import json_body
+from server.http.json_responses import error_response, json_response
 from server.http.operator.config_file import change_config, config_path
 from server.setup.ground import apply_ground
 from server.system.errors import UserError
@@ -33,10 +34,10 @@ async def get_walk(request: web.Request) -> web.Response:
 
 
 @routes.post(f"{OPERATOR_PATH}/walk")
-async def post_walk(request: web.Request) -> web.Response:
+@json_body(WalkCommand)
+async def post_walk(request: web.Request, command: WalkCommand) -> web.Response:
     """Start or resume a walk, finish it and calibrate from it, or write the result into the configuration."""
     calibration = request.app[SERVICE].calibration
-    command = await read_json(request, WalkCommand)
     match command.action:
         case "start":
             calibration.start()

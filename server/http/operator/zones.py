@@ -16,7 +16,8 @@ from server.config.loader import load_config
 from server.config.site_config import Config
 from server.http.access.permissions import OPERATOR_PATH
 from server.http.app_keys import CONTROL, SERVICE
-from server.http.json_responses import error_response, json_response, read_json
+from server.http.json_requests import json_body
+from server.http.json_responses import error_response, json_response
 from server.http.operator.config_file import change_config, config_path
 from server.http.operator.schema import SiteZone, SiteZones, ZoneRule
 from server.rules import RuleKind
@@ -62,9 +63,9 @@ async def get_zones(request: web.Request) -> web.Response:
 
 
 @routes.put(_PATH)
-async def put_zone(request: web.Request) -> web.Response:
+@json_body(ZoneToSave)
+async def put_zone(request: web.Request, wanted: ZoneToSave) -> web.Response:
     """Save a zone with its rules in the configuration file, or the rules on no zone, and apply that."""
-    wanted = await read_json(request, ZoneToSave)
     rules = [{**msgspec.structs.asdict(rule), "id": rule.rule} for rule in wanted.rules]
     if wanted.zone is None:
         return await _change(request, partial(save_site_rules, wanted=rules), wanted.digest)
@@ -74,9 +75,9 @@ async def put_zone(request: web.Request) -> web.Response:
 
 
 @routes.delete(_PATH)
-async def delete_zone(request: web.Request) -> web.Response:
+@json_body(ZoneToRemove)
+async def delete_zone(request: web.Request, wanted: ZoneToRemove) -> web.Response:
     """Remove a zone and its rules from the configuration file, and apply that."""
-    wanted = await read_json(request, ZoneToRemove)
     return await _change(request, partial(remove_zone, zone_id=wanted.zone), wanted.digest)
 
 
