@@ -73,11 +73,18 @@ REASON_MAX = 1000
 """Characters of a reason, at most."""
 
 
+RetryCause = Literal["unopened", "changed"]
+"""Why a camera's source is opened again: it could not be, or what it sends has changed."""
+
+
 class UnavailableCamera(msgspec.Struct, frozen=True, kw_only=True):
-    """Why a camera's process cannot open its source; it tries again."""
+    """Why a camera's process cannot use its source; it opens it again."""
 
     reason: Annotated[str, msgspec.Meta(max_length=REASON_MAX)]
     """In a line for people, without passwords."""
+    cause: RetryCause = "unopened"
+    retry_s: Duration = 0.0
+    """Seconds until it is opened again."""
 
 
 class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):

@@ -10,7 +10,7 @@ key                                              payload                        
 ``myview/SITE/camera/ID/video``                  one access unit, Annex B or VP8      :class:`FrameHeader`
 ``myview/SITE/camera/ID/tracks``                 :class:`CameraTracks`
 ``myview/SITE/camera/ID/status``                 :class:`~server.messaging.camera_status.CameraStatus`
-``myview/SITE/camera/ID/unavailable``            ``UnavailableCamera``, while its source cannot be opened
+``myview/SITE/camera/ID/unavailable``            ``UnavailableCamera``, while its source cannot be used
 ``myview/SITE/camera/ID/thumbs/LOCAL``           JPEG of one person                   :class:`ThumbnailHeader`
 ``myview/SITE/camera/ID/detections``             :class:`FrameDetections`
 ``myview/SITE/camera/ID/position_corrections``   ``PositionCorrections``, to the camera

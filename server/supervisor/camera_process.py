@@ -14,6 +14,7 @@ from server.config.camera_password import fill_in_password
 from server.config.running_config import ActiveConfig
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
+from server.messaging.camera_status import RetryCause
 from server.supervisor.reload import ReloadPlan
 from server.supervisor.sighup import reloads
 from server.supervisor.startup_checks import check_source_opens
@@ -33,7 +34,7 @@ async def camera_process(running: ActiveConfig, camera_id: str) -> None:
     """Run one camera; restart it when a reload changes its settings.
 
     Waits for a network camera or device that does not answer yet, and, once the site has started, for any
-    source that cannot be opened or used. Meanwhile the best-view service is told why.
+    source that cannot be opened or used. Meanwhile the best-view service is told why, and until when.
 
     Raises:
         UserError: its source cannot be opened.
@@ -43,7 +44,7 @@ async def camera_process(running: ActiveConfig, camera_id: str) -> None:
         signal_started()  # opening it mostly waits for a network or device, so others may start meanwhile
     restart = asyncio.Event()
     reload_task = asyncio.create_task(_follow(running, camera_id, restart), name="reload")
-    attempts = _Attempts(camera_id, restart)
+    attempts = _Attempts(running, camera_id, restart)
     try:
         camera = await _create(running, camera_id, attempts, started=False)
         signal_started()
@@ -53,17 +54,19 @@ async def camera_process(running: ActiveConfig, camera_id: str) -> None:
         raise UnavailableError(f"camera {camera_id}: {error}") from error
     finally:
         reload_task.cancel()
+        attempts.close()
         await asyncio.gather(reload_task, return_exceptions=True)
 
 
 class _Attempts:
-    """Spaces the attempts to use a camera, and throttles the log lines of those that fail.
+    """Spaces the attempts to use a camera, reports those that fail, and throttles their log lines.
 
     A camera may also be opened each time and fail soon after. ``restart`` is set when the settings change.
     """
 
-    def __init__(self, camera_id: str, restart: asyncio.Event) -> None:
-        self._id, self.restart = camera_id, restart
+    def __init__(self, running: ActiveConfig, camera_id: str, restart: asyncio.Event) -> None:
+        self._running, self._id, self.restart = running, camera_id, restart
+        self._report = UnavailabilityReport(camera_id)
         self._failures, self._reopenings = LogThrottle(quiet_s=0.0), LogThrottle()
         self._backoff = Backoff(_RETRY_FIRST_S, _RETRY_MAX_S)
 
@@ -71,10 +74,11 @@ class _Attempts:
         """Record that the camera cannot be opened, and wait before the next attempt."""
         if (more := self._failures.record(str(error))) is not None:
             log.warning("%s%s; retrying", error, more)
-        await self._wait()
+        await self._wait(error, "unopened")
 
     def opened(self) -> None:
         """Record that it has been opened."""
+        self.close()
         if ended := self._failures.end():
             log.info("camera %s is available, after %.0f s", self._id, ended.seconds)
 
@@ -84,15 +88,21 @@ class _Attempts:
             self._backoff.reset()
         if (more := self._reopenings.record(str(error))) is not None:
             log.warning("camera %s: %s%s; opening it again", self._id, error, more)
-        await self._wait()
+        await self._wait(error, "changed")
 
     def settings_changed(self) -> None:
         """Begin with the shortest delay again: other settings may be right."""
         self._backoff.reset()
 
-    async def _wait(self) -> None:
+    def close(self) -> None:
+        """Stop reporting."""
+        self._report.close()
+
+    async def _wait(self, error: UserError, cause: RetryCause) -> None:
+        pause_s = self._backoff.next()
+        self._report.send(self._running.now, str(error), cause, pause_s)
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self.restart.wait(), self._backoff.next())
+            await asyncio.wait_for(self.restart.wait(), pause_s)
             self.settings_changed()
 
 
@@ -104,20 +114,18 @@ async def _create(
     The process keeps running meanwhile: a new one would load all libraries again. ``started``: the site has
     started, so an error of this camera must not end it.
     """
-    with contextlib.closing(UnavailabilityReport(running.now, camera_id)) as report:
-        while True:
-            attempts.restart.clear()
-            try:
-                camera = await asyncio.to_thread(_open, running.now, camera_id)
-            except UserError as error:
-                if not (started or isinstance(error, UnavailableError)):
-                    raise
-                report.send(str(error))
-                started = True
-                await attempts.failed(error)
-            else:
-                attempts.opened()
-                return camera
+    while True:
+        attempts.restart.clear()
+        try:
+            camera = await asyncio.to_thread(_open, running.now, camera_id)
+        except UserError as error:
+            if not (started or isinstance(error, UnavailableError)):
+                raise
+            started = True
+            await attempts.failed(error)
+        else:
+            attempts.opened()
+            return camera
 
 
 def _open(config: Config, camera_id: str) -> CameraProcess:

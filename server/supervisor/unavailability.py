@@ -1,38 +1,51 @@
-"""Tells the best-view services why a camera cannot be opened, while its process tries again."""
+"""Tells the best-view services why a camera's source cannot be used, and when it is opened again."""
 
 from __future__ import annotations
+
+import time
+from dataclasses import dataclass
 
 import msgspec
 
 from server.config.site_config import Config
 from server.messaging.bus import Bus
-from server.messaging.camera_status import REASON_MAX, UnavailableCamera
+from server.messaging.camera_status import REASON_MAX, RetryCause, UnavailableCamera
 from server.messaging.messages import ZenohKeys
 
 
+@dataclass(frozen=True, slots=True)
+class _Pause:
+    reason: str
+    cause: RetryCause
+    until: float
+    """On the monotonic clock."""
+
+
 class UnavailabilityReport:
-    """Sends the present reason after each attempt, and to each service that connects.
+    """Sends the present reason before each pause, and to each service that connects.
 
     It has a connection of its own, from the first reason on until it is closed.
     """
 
-    def __init__(self, config: Config, camera_id: str) -> None:
-        self._config, self._id = config, camera_id
-        self._keys = ZenohKeys(config.site.name)
+    def __init__(self, camera_id: str) -> None:
+        self._id = camera_id
         self._bus: Bus | None = None
-        self._message = b""
+        self._key = ""
+        self._pause = _Pause("", "unopened", 0.0)
 
-    def send(self, reason: str) -> None:
-        """Send why the camera cannot be opened.
+    def send(self, config: Config, reason: str, cause: RetryCause, retry_s: float) -> None:
+        """Send why the camera cannot be used, and that it is opened again in so many seconds.
 
         Raises:
             UserError: the bus's address is not supported.
         """
         line = " ".join(reason.removeprefix(f"camera {self._id}: ").split())[:REASON_MAX]
-        self._message = msgspec.msgpack.encode(UnavailableCamera(reason=line))
+        self._pause = _Pause(line, cause, time.monotonic() + retry_s)
         if self._bus is None:
-            self._bus = Bus.client(self._config.zenoh, self._id)
-            self._bus.watch_alive(self._keys.bestview("**"), self._on_service)
+            keys = ZenohKeys(config.site.name)
+            self._key = keys.camera(self._id, "unavailable")
+            self._bus = Bus.client(config.zenoh, self._id)
+            self._bus.watch_alive(keys.bestview("**"), self._on_service)
         else:
             self._publish()
 
@@ -40,6 +53,7 @@ class UnavailabilityReport:
         """Disconnect."""
         if self._bus is not None:
             self._bus.close()
+            self._bus = None
 
     def _on_service(self, _: str, is_present: bool) -> None:
         if is_present:
@@ -47,4 +61,8 @@ class UnavailabilityReport:
 
     def _publish(self) -> None:
         if self._bus is not None:
-            self._bus.publish(self._keys.camera(self._id, "unavailable"), self._message)
+            pause = self._pause
+            message = UnavailableCamera(
+                reason=pause.reason, cause=pause.cause, retry_s=max(0.0, pause.until - time.monotonic())
+            )
+            self._bus.publish(self._key, msgspec.msgpack.encode(message))

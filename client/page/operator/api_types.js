@@ -31,6 +31,7 @@
  * @property {number | null} optimal share of the windows
  * @property {number} solved_windows
  * @property {number | null} floor_offset meters; null: tracked alone
+ * @property {number | null} retry_at unix seconds until which it waits to open its source again; null: it does not wait
  * @property {{text: string, at: number} | null} last_error
  * @property {CameraPicture | null} picture
  *

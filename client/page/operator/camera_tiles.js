@@ -103,12 +103,13 @@ class CameraTile {
     this.item.classList.toggle('unclear', camera.state === 'live' && (camera.condition in CONDITIONS || camera.covered_share > 0));
     setText(this.state, formatState(camera));
     ROWS.forEach(([, , format], at) => setText(this.values[at][1], format(camera)));
-    setText(this.error, camera.message || formatLastError(camera));
+    setText(this.error, formatProblem(camera));
   }
 }
 
 /** @param {CameraDiagnostics} camera */
-function formatState({ state, condition, condition_since: since, covered_share: covered }) {
+function formatState({ state, retry_at: retryAt, condition, condition_since: since, covered_share: covered }) {
+  if (retryAt !== null) return 'Waiting';
   const wrong = state === 'live' ? CONDITIONS[condition] : undefined;
   if (wrong) return since ? `${wrong} since ${formatTime(since)}` : wrong;
   if (state === 'live' && covered > 0) return `${Math.round(100 * covered)} % covered`;
@@ -116,7 +117,8 @@ function formatState({ state, condition, condition_since: since, covered_share: 
 }
 
 /** @param {CameraDiagnostics} camera */
-function formatLastError({ last_error: last }) {
+function formatProblem({ message, retry_at: retryAt, last_error: last }) {
+  if (message) return retryAt === null ? message : `Will be opened again at ${formatTime(retryAt)}: ${message}`;
   return last ? `Last error, ${formatTime(last.at)}: ${last.text}` : '';
 }
 

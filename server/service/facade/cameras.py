@@ -68,6 +68,8 @@ class CameraDiagnostics(CameraInfo, frozen=True):
     floor_offset: float | None
     """Meters by which it disagrees with the others about where people stand, and is corrected; null: tracked
     alone."""
+    retry_at: float | None
+    """When its source, which cannot be used, is opened again, unix seconds; null: now, or it is open."""
     last_error: CameraProblem | None
     """The last problem; it stays when the camera has recovered."""
     picture: ImagePlacement | None
@@ -163,10 +165,10 @@ class CameraService:
         )
 
     def _diagnostics(self, camera: str, state: CameraState) -> CameraDiagnostics:
-        status, metrics = state.status, state.metrics
+        status, metrics, unavailable = state.status, state.metrics, state.unavailable
         info = msgspec.structs.asdict(self._info(camera, state))
         return CameraDiagnostics(
-            **{**info, "message": state.message or state.unavailable},
+            **{**info, "message": state.message or (unavailable.reason if unavailable else "")},
             bad_messages=state.bad_messages,
             clock_offset=status.clock_offset if status else None,
             sync_error=metrics.sync_error,
@@ -174,6 +176,7 @@ class CameraService:
             optimal=metrics.optimal,
             solved_windows=metrics.recent_solved_windows,
             floor_offset=self._pipeline.joint.offsets.get(camera),
+            retry_at=unavailable.retry_at if unavailable and unavailable.retry_s else None,
             last_error=metrics.last_error,
             picture=None if metrics.size is None else self._placement(metrics.size),
         )

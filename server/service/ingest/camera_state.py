@@ -2,11 +2,34 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
 from datetime import datetime
 
-from server.messaging.camera_status import SUBSTREAM_AWAY, CameraStatus, motion_text, picture_text
+from server.messaging.camera_status import (
+    SUBSTREAM_AWAY,
+    CameraStatus,
+    RetryCause,
+    motion_text,
+    picture_text,
+)
 from server.service.metrics.camera_metrics import CameraMetrics
+
+
+@dataclass(frozen=True, slots=True)
+class Unavailability:
+    """Why a camera's process cannot use its source, and when it opens it again."""
+
+    reason: str
+    """For the operator: it may name addresses."""
+    cause: RetryCause
+    retry_at: float
+    """Unix seconds by this service's clock."""
+
+    @property
+    def retry_s(self) -> float:
+        """Seconds until then; 0: it is being opened."""
+        return max(0.0, self.retry_at - time.time())
 
 
 @dataclass(slots=True)
@@ -16,8 +39,10 @@ class CameraState:
     alive: bool = False
     refused: str = ""
     """Why its frames are refused; empty: they are used."""
-    unavailable: str = ""
-    """Why its process cannot open its source, for the operator: it may name addresses; empty: it can."""
+    unavailable: Unavailability | None = None
+    """None: its process is connected, or tells nothing."""
+    stream_changes: int = 0
+    """How often its source was opened again because what it sends had changed."""
     status: CameraStatus | None = None
     ended: bool = False
     bad_messages: int = 0

@@ -31,7 +31,7 @@ from server.messaging.messages import (
     ThumbnailHeader,
     camera_of_key,
 )
-from server.service.ingest.camera_state import CameraState
+from server.service.ingest.camera_state import CameraState, Unavailability
 from server.service.ingest.epoch_aligner import EpochAligner
 from server.service.ingest.validation import is_plausible
 from server.service.streaming.audio_buffer import AudioBuffer
@@ -125,7 +125,7 @@ class Ingest:
         state.status = None  # of an earlier connection
         state.metrics.reset_recent()
         if is_present:
-            state.refused, state.unavailable, state.ended = "", "", False
+            state.refused, state.unavailable, state.ended = "", None, False
             self._aligner.camera_connected(camera)
         else:
             state.metrics.record_problem("its process disconnected")
@@ -222,18 +222,22 @@ class Ingest:
                 state.metrics.record_problem(picture_text("clear", status.covered_share))
 
     def unavailable(self, message: Message) -> None:
-        """Record why a camera that is not connected cannot open its source."""
+        """Record why a camera that is not connected cannot use its source, and when it opens it again."""
         state, _ = self._state_of(message)
         if state is None:
             return
         try:
-            reason = self._unavailable_camera.decode(message.payload).reason
+            told = self._unavailable_camera.decode(message.payload)
         except DECODE_ERRORS as error:
             state.count_bad_message(error)
             return
-        if not state.alive and reason != state.unavailable:
-            state.unavailable = reason
-            state.metrics.record_problem(reason)
+        if state.alive:
+            return  # it was late
+        before = state.unavailable
+        state.unavailable = Unavailability(told.reason, told.cause, time.time() + told.retry_s)
+        if before is None or before.reason != told.reason:
+            state.metrics.record_problem(told.reason)
+            state.stream_changes += told.cause == "changed"
 
     def thumbnail(self, message: Message) -> None:
         """Keep the newest thumbnail of a track."""

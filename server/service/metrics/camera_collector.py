@@ -61,6 +61,11 @@ class CameraCollector(Collector):
         yield self._counter(
             "lost_frames", "Frames missing when their GOP was decided.", lambda camera, _: lost[camera]
         )
+        yield self._counter(
+            "stream_changes",
+            "Changes of what the camera sends after which it was opened again.",
+            lambda _, state: state.stream_changes,
+        )
         yield self._counter("windows", "Windows solved.", lambda _, state: state.metrics.totals.windows)
         yield self._counter(
             "optimal_windows",
@@ -109,7 +114,14 @@ class CameraCollector(Collector):
             "Windows whose solver was stopped by a limit of work or time.",
             labels=["camera", "limit"],
         )
+        retry = GaugeMetricFamily(
+            "myview_camera_retry_seconds",
+            "Until a source that cannot be used is opened again.",
+            labels=["camera", "cause"],
+        )
         for camera, state in self._pipeline.ingest.states.items():
+            if state.unavailable is not None:
+                retry.add_metric([camera, state.unavailable.cause], state.unavailable.retry_s)
             for limit, count in state.metrics.totals.limited.items():
                 limited.add_metric([camera, limit], count)
             labels = [camera]
@@ -124,7 +136,7 @@ class CameraCollector(Collector):
                 offset.add_metric(labels, state.status.clock_offset)
                 for name in CONDITION_TEXTS:
                     condition.add_metric([camera, name], float(name == state.status.condition))
-        return [live, frames, missed, shed, without_peers, bad, offset, limited, condition]
+        return [live, frames, missed, shed, without_peers, bad, offset, limited, condition, retry]
 
     def _stages(self) -> Metric:
         family = HistogramMetricFamily(

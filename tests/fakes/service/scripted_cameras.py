@@ -16,7 +16,7 @@ from server.config.loader import build_config
 from server.config.sections import EncodeSettings, SiteSettings
 from server.config.site_config import Config
 from server.media.picture import Codec
-from server.messaging.camera_status import CameraStatus
+from server.messaging.camera_status import CameraStatus, RetryCause, UnavailableCamera
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import (
@@ -145,6 +145,12 @@ def video(camera: str, unit: AccessUnit, boot: int = 1) -> Message:
 def tracks(message: CameraTracks) -> Message:
     """Return a track message as received from the bus."""
     return Message(ZenohKeys("hall").camera(message.camera, "tracks"), msgspec.msgpack.encode(message), b"")
+
+
+def unavailable(camera: str, cause: RetryCause, retry_s: float, reason: str) -> Message:
+    """Return why a camera's source cannot be used, as received from the bus."""
+    message = UnavailableCamera(reason=reason, cause=cause, retry_s=retry_s)
+    return Message(ZenohKeys("hall").camera(camera, "unavailable"), msgspec.msgpack.encode(message), b"")
 
 
 def thumbnail(camera: str, track: int, jpeg: bytes, pulse: int = 0, boot: int = 1) -> Message:

@@ -7,6 +7,7 @@ import logging
 import os
 import signal
 from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from server.camera.sources import stream_reader
 from server.config.running_config import ActiveConfig
 from server.config.site_config import Config
 from server.messaging.bus import Bus
+from server.messaging.camera_status import UnavailableCamera
 from server.messaging.messages import ZenohKeys
 from server.supervisor import camera_process as camera_module
 from server.supervisor.camera_process import camera_process
@@ -184,6 +186,41 @@ async def test_a_camera_whose_video_does_not_fit_once_the_site_runs_is_tried_aga
 
 
 @pytest.mark.timeout(3 * PATIENCE + 10)
+async def test_services_are_told_why_a_camera_that_changes_waits_and_how_long(
+    begin: Callable[..., Awaitable[Site]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A service that connects during the pause is told what is left of it."""
+    pause_s = 60.0
+    monkeypatch.setattr(camera_module, "_RETRY_FIRST_S", pause_s)
+    monkeypatch.setattr(camera_module, "_RETRY_MAX_S", pause_s)
+    monkeypatch.setattr(stream_reader, "_RETRY_FIRST_S", 0.01)
+    site = await begin(camera="resizing", answers=True)
+    await site.log_lines.until(lambda line: "its images are" in line)
+    changed = asyncio.get_running_loop().time()
+    bus, messages = Bus.router(site.config.zenoh), asyncio.Queue[UnavailableCamera]()
+    try:
+        keys = ZenohKeys(site.config.site.name)
+        bus.subscribe(
+            keys.camera("c0", "unavailable"),
+            lambda message: messages.put_nowait(
+                msgspec.msgpack.decode(message.payload, type=UnavailableCamera)
+            ),
+        )
+        waited_s = asyncio.get_running_loop().time() - changed
+        bus.declare_alive(keys.bestview("alive"))
+        async with asyncio.timeout(PATIENCE):
+            told = await messages.get()
+    finally:
+        bus.close()
+    assert told.cause == "changed"
+    assert told.reason.partition(": ")[2] in {
+        f"its images are {now} now, they were {before}"
+        for now, before in (("64x48", "128x48"), ("128x48", "64x48"))
+    }
+    assert 0.0 < told.retry_s <= pause_s - waited_s
+
+
+@pytest.mark.timeout(3 * PATIENCE + 10)
 @pytest.mark.parametrize(("stable_s", "delays"), [(10.0, [0.5, 1.0, 2.0]), (0.0, [0.5] * 3)])
 async def test_a_camera_that_changes_again_and_again_is_opened_less_and_less_often(
     begin: Callable[..., Awaitable[Site]],
@@ -213,10 +250,13 @@ async def test_a_camera_that_changes_again_and_again_is_opened_less_and_less_oft
     assert 1 <= len(changes) <= 2, "one line for each change: larger, and smaller again"
 
 
-async def test_other_settings_are_tried_as_if_nothing_had_failed() -> None:
+async def test_other_settings_are_tried_as_if_nothing_had_failed(tmp_path: Path) -> None:
+    bus = f"tcp/127.0.0.1:{free_port()}"
+    content = {"cameras": [{"id": "c0", "source": "scene:room"}], "zenoh": {"connect": bus, "listen": bus}}
+    (tmp_path / "site.yaml").write_text(yaml.safe_dump(content))
     restart = asyncio.Event()
     restart.set()
-    attempts = camera_module._Attempts("c0", restart)
-    for _ in range(5):
-        await attempts.failed(UnavailableError("c0: no route"))
+    with closing(camera_module._Attempts(ActiveConfig(tmp_path / "site.yaml"), "c0", restart)) as attempts:
+        for _ in range(5):
+            await attempts.failed(UnavailableError("c0: no route"))
     assert attempts._backoff.failures == 0

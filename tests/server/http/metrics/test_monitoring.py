@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 
 from fakes.paths import CONFIGS
@@ -17,6 +19,7 @@ from fakes.prometheus.promql_series import ExportedMetrics, firing_series, selec
 from fakes.service.fed_site import ServedSite
 from fakes.service.scripted_cameras import CAMERAS, camera_tracks, status, tracks
 from server.config.sections import LinkSettings
+from server.service.ingest.camera_state import Unavailability
 from server.service.other_sites.people_elsewhere import LinkedSite
 
 SEVERITIES = {"critical", "warning", "info"}
@@ -30,6 +33,7 @@ async def printed(served: ServedSite) -> ExportedMetrics:
     for camera in CAMERAS:
         served.service.ingest.status(status(camera))
         served.service.ingest.tracks(tracks(camera_tracks(camera, 2, {}, solved_at=1.0)))
+        served.service.ingest.states[camera].unavailable = Unavailability("off", "unopened", time.time() + 60)
     async with served.session.get("/metrics") as answer:
         assert answer.status == 200
         return ExportedMetrics.of(await answer.text())

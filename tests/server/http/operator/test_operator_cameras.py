@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import aclosing
 
-import msgspec
 import pytest
 
 from camsync import Credentials, PulseClient, PulseServer
 from fakes.service.fed_site import A, B, ServedSite, serve_site
-from fakes.service.scripted_cameras import CAMERAS, status
+from fakes.service.scripted_cameras import CAMERAS, status, unavailable
 from server.messaging.inbox import Message
 from server.messaging.messages import ZenohKeys
 
@@ -48,15 +48,45 @@ async def test_the_last_error_is_shown_until_the_next_one(site_with_people: Serv
 
 async def test_only_operators_see_why_a_camera_cannot_be_opened(site_with_people: ServedSite) -> None:
     """The reason may name an address in the cameras' network."""
-    ingest, key = site_with_people.service.ingest, ZenohKeys("hall").camera(A, "unavailable")
-    reason = "rtsp://10.0.0.9: Connection refused"
+    ingest, reason = site_with_people.service.ingest, "rtsp://10.0.0.9: Connection refused"
     ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
-    ingest.unavailable(Message(key, msgspec.msgpack.encode({"reason": reason}), b""))
+    ingest.unavailable(unavailable(A, "unopened", 10.0, reason))
     operators, viewers = [
         (await site_with_people.get_json(path))["cameras"][0]["message"]
         for path in ("/api/operator/cameras", "/api/cameras")
     ]
     assert (operators, viewers) == (reason, "")
+
+
+async def test_a_camera_that_waits_to_be_opened_again_says_until_when(site_with_people: ServedSite) -> None:
+    async def retry_at() -> float | None:
+        camera = (await site_with_people.get_json("/api/operator/cameras"))["cameras"][0]
+        return None if camera["retry_at"] is None else float(camera["retry_at"])
+
+    async def exported(metric: str) -> list[str]:
+        async with site_with_people.session.get("/metrics") as answer:
+            lines = (await answer.text()).splitlines()
+        return [line for line in lines if line.startswith(f"{metric}{{")]
+
+    ingest = site_with_people.service.ingest
+    assert await retry_at() is None
+    assert not await exported("myview_camera_retry_seconds")
+    for change in (1, 2):
+        ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
+        for pause_s in (50.0, 40.0):  # it is told again, to a service that has connected
+            began = time.time()
+            ingest.unavailable(unavailable(A, "changed", pause_s, "its images are small"))
+            until = await retry_at()
+            assert until is not None
+            assert began + pause_s <= until <= time.time() + pause_s
+        (line,) = await exported("myview_camera_retry_seconds")
+        assert line.startswith(f'myview_camera_retry_seconds{{camera="{A}",cause="changed"}} ')
+        assert 0 < float(line.split()[1]) <= 40
+        assert f'{{camera="{A}"}} {change}.0' in (await exported("myview_camera_stream_changes_total"))[0]
+        ingest.unavailable(unavailable(A, "changed", 0.0, "its images are small"))
+        assert await retry_at() is None, "it is being opened"
+        ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=True)
+        assert not await exported("myview_camera_retry_seconds")
 
 
 async def test_the_floor_shows_calibrated_cameras_whose_size_is_known() -> None:

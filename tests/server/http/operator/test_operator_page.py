@@ -36,6 +36,7 @@ from fakes.service.scripted_cameras import (
     small_config,
     status,
     tracks,
+    unavailable,
 )
 from fakes.setup.onvif_camera import FakeProfile, OnvifCamera, onvif_cameras
 from fakes.timeouts import PATIENCE
@@ -349,6 +350,24 @@ async def test_a_tile_says_what_is_wrong_with_the_picture(browser: Browser) -> N
         await expect(tile.locator(".state")).to_have_text("35 % covered")
         await expect(tile).to_have_class("camera-tile unclear")
         await expect(tile.locator(".last-error")).to_contain_text("35 % of the picture is covered: ")
+        served.service.ingest.status(status(A))
+        await expect(tile.locator(".state")).to_have_text("Live")
+
+
+async def test_a_tile_says_that_a_camera_waits_why_and_until_when(browser: Browser) -> None:
+    async with open_operator_page(browser, "#cameras") as (served, page):
+        show_people(served)
+        tile = page.locator(".camera-tile").first
+        await expect(tile.locator(".state")).to_have_text("Live")
+        served.service.ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
+        served.service.ingest.unavailable(unavailable(A, "changed", 3600.0, "10.0.0.9: its images are small"))
+        await expect(tile.locator(".state")).to_have_text("Waiting")
+        line = r"Will be opened again at \d.*: 10\.0\.0\.9: its images are small"
+        await expect(tile.locator(".last-error")).to_have_text(re.compile(line))
+        served.service.ingest.unavailable(unavailable(A, "changed", 0.0, "10.0.0.9: its images are small"))
+        await expect(tile.locator(".last-error")).to_have_text("10.0.0.9: its images are small")
+        await expect(tile.locator(".state")).to_have_text("Gone")
+        served.service.connect_cameras(A)
         served.service.ingest.status(status(A))
         await expect(tile.locator(".state")).to_have_text("Live")
 

@@ -169,16 +169,17 @@ def test_why_a_camera_cannot_be_opened_is_for_operators_until_it_connects() -> N
     state = served.ingest.states["c0"]
     served.ingest.alive(KEYS.camera("c0", "alive"), is_present=False)
     served.handle("unavailable", UNAVAILABLE)
-    assert (state.unavailable, state.message) == (REASON, "")
+    assert state.unavailable is not None
+    assert (state.unavailable.reason, state.unavailable.retry_s, state.message) == (REASON, 0.0, "")
     assert state.metrics.last_error is not None
     first = state.metrics.last_error
     assert first.text == REASON
     served.handle("unavailable", UNAVAILABLE)
     assert state.metrics.last_error is first, "it is recorded once"
     served.ingest.alive(KEYS.camera("c0", "alive"), is_present=True)
-    assert state.unavailable == ""
+    assert state.unavailable is None
     served.handle("unavailable", UNAVAILABLE)
-    assert state.unavailable == "", "it was late"
+    assert state.unavailable is None, "it was late"
 
 
 anything = st.recursive(
