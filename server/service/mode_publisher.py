@@ -31,13 +31,13 @@ class ModePublisher:
         self.meter.arrived(frame.pulse)
         self._splicer.publish_frame(camera, frame)
 
-    def usual(self, choices: GopChoices) -> None:
-        """Note a usual decision, before it is published."""
+    def record_balanced(self, choices: GopChoices) -> None:
+        """Record a decision of the delay balanced, before it is published."""
         self._choices.put(choices)
         self.meter.decided(DelayMode.BALANCED, choices.first)
 
-    def replace_usual(self, change: Callable[[GopChoices], GopChoices]) -> None:
-        """Replace every usual decision that is kept for later ones by a changed one."""
+    def replace_balanced(self, change: Callable[[GopChoices], GopChoices]) -> None:
+        """Replace every balanced decision that is kept for later ones by a changed one."""
         self._choices.replace(change)
 
     def publish(

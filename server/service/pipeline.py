@@ -323,7 +323,7 @@ class BestViewPipeline:
 
     def _send(self, decision: GopDecision) -> None:
         choices = self.decision_state.put(decision)
-        self.mode_publisher.usual(choices)
+        self.mode_publisher.record_balanced(choices)
         self.recorder.put(choices, self.pulses.pulse0, self.state_replication.numbers_since)
         for callback in self.on_decision:
             callback(choices)

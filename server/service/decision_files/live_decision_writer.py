@@ -90,7 +90,7 @@ class LiveDecisionWriter:
 
     def write_views_or_skip(self, decision: ModeDecision) -> None:
         """Write the choices for viewers with another delay; skip them if writing fails."""
-        with contextlib.suppress(OSError):  # the usual decisions report it
+        with contextlib.suppress(OSError):  # the balanced decisions report it
             self._writer.write_views(decision)
 
     async def forget(self, numbers: Collection[int]) -> None:

@@ -23,7 +23,7 @@ def forget_people(pipeline: BestViewPipeline, numbers: Collection[int]) -> None:
     pipeline.decision_state.forget(numbers)
     without = partial(without_people, numbers=numbers)
     pipeline.recorder.recent.replace(without)
-    pipeline.mode_publisher.replace_usual(without)
+    pipeline.mode_publisher.replace_balanced(without)
     pipeline.assist.flags.forget(numbers)
     pipeline.rules.forget(numbers)
     pipeline.state_replication.forget(numbers)

@@ -149,9 +149,9 @@ class StreamService:
     def delays(self) -> list[ViewerDelay]:
         """Return the delays that viewers may choose, each as it is measured now."""
         pipeline, fps = self._pipeline, self._pipeline.config.site.fps
-        usual = pipeline.config.lookahead_of(pipeline.decider.view)
-        longer = usual + pipeline.decider.modes.smooth_lookahead * pipeline.config.gop
-        lookahead = {DelayMode.LIVE: 0, DelayMode.BALANCED: usual, DelayMode.SMOOTH: longer}
+        balanced = pipeline.config.lookahead_of(pipeline.decider.view)
+        longer = balanced + pipeline.decider.modes.smooth_lookahead * pipeline.config.gop
+        lookahead = {DelayMode.LIVE: 0, DelayMode.BALANCED: balanced, DelayMode.SMOOTH: longer}
         return [self._delay(mode, lookahead[mode] / fps) for mode in DelayMode]
 
     def _delay(self, mode: DelayMode, lookahead_s: float) -> ViewerDelay:

@@ -1,6 +1,6 @@
 """Views for viewers who choose another delay: live without look-ahead, or smooth with a longer one.
 
-Both share the windows and costs of the usual decision, and select for all people at once, whether anybody
+Both share the windows and costs of the balanced decision, and select for all people at once, whether anybody
 watches or not: what a viewer is shown depends on the cameras' messages alone, live as offline.
 """
 

@@ -1,4 +1,4 @@
-"""The views of all delays, selected beside the usual ones, and how good each delay's are."""
+"""The views of all delays, selected beside the balanced ones, and how good each delay's are."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class ModeSelection:
 
     @property
     def smooth_lookahead(self) -> int:
-        """GOPs that the delay smooth looks ahead further than the usual one."""
+        """GOPs that the delay smooth looks ahead further than balanced."""
         return self._behind
 
     def step(self, last: int, window: Callable[[], LookaheadWindow], *, skipped: bool) -> None:
@@ -57,7 +57,7 @@ class ModeSelection:
     def add(
         self, part: LookaheadPart, frames: int, gops: GopCosts, weight: Floats, views: Ints, before: Ints
     ) -> None:
-        """Add a usual decision.
+        """Add a decision of the delay balanced.
 
         Args:
             part: its look-ahead, whose first GOP is final.

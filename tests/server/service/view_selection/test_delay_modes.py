@@ -43,16 +43,16 @@ def decided(
     config = small_config(view={"smooth_lookahead_s": SMOOTH_S, **view})
     decider = ViewDecider(config, dict.fromkeys(CAMERAS), lambda *_: True)
     decider.people._registry = TrackNumbers()  # type: ignore[assignment]
-    usual: list[GopDecision] = []
+    balanced: list[GopDecision] = []
     others: list[ModeDecision] = []
     for number, seen in enumerate(story):
         words = (camera_tracks(camera, number, boxes) for camera, boxes in seen.items())
-        usual += decider.step(epoch_of(number, *words))
+        balanced += decider.step(epoch_of(number, *words))
         others += decider.modes.take()
     if end is not None:
-        usual += decider.finish(end)
+        balanced += decider.finish(end)
         others += decider.modes.take()
-    return usual, others, decider
+    return balanced, others, decider
 
 
 def shown(decisions: Sequence[ModeDecision], mode: DelayMode, number: int = 1) -> dict[int, str | None]:
@@ -91,11 +91,11 @@ def test_smooth_views_are_those_of_a_longer_look_ahead() -> None:
     rng = np.random.default_rng(1)
     story = [IN_A if part else IN_B for part in rng.integers(0, 2, 12).repeat(rng.integers(1, 5, 12))]
     end = len(story) * GOP - 1
-    usual, others, _ = decided(story, end)
+    balanced, others, _ = decided(story, end)
     smooth = shown(others, DelayMode.SMOOTH)
-    assert list(smooth) == [decision.first // GOP for decision in usual], "each GOP once, in order"
+    assert list(smooth) == [decision.first // GOP for decision in balanced], "each GOP once, in order"
     longer, _, _ = decided(story, end, lookahead_s=SMOOTH_S)
-    # The usual look-ahead's last frames stand for more than those of the longer one.
+    # The balanced look-ahead's last frames stand for more than those of the longer one.
     agreed = [smooth[decision.first // GOP] == decision.choices[0].camera for decision in longer]
     assert np.mean(agreed) > 0.9
 
@@ -117,9 +117,9 @@ def test_somebody_new_costs_nobody_a_cut() -> None:
 
 
 def test_a_longer_look_ahead_than_smooth_is_smooth() -> None:
-    usual, others, _ = decided([IN_A] * 4 + [IN_B] * 8, smooth_lookahead_s=0.04)
+    balanced, others, _ = decided([IN_A] * 4 + [IN_B] * 8, smooth_lookahead_s=0.04)
     assert shown(others, DelayMode.SMOOTH) == {
-        decision.first // GOP: decision.choices[0].camera for decision in usual
+        decision.first // GOP: decision.choices[0].camera for decision in balanced
     }
 
 
