@@ -30,7 +30,7 @@ from server.messaging.messages import CameraTracks, ZenohKeys
 from server.service.bus_connection import BusConnection
 from server.service.identity.people import PersonTracker
 from server.service.identity.service_area import area_to_take_in
-from server.service.identity.sharding import people_of_service
+from server.service.identity.sharding import create_sharding
 from server.service.identity.state_replication import StateReplication
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.replication.service_replication import ServiceReplication
@@ -149,7 +149,7 @@ class DividedService:
             {camera: grounds[camera] for camera in self.cameras},
             (WIDTH, HEIGHT),
             WINDOW - STRIDE,
-            people_of_service(config, grounds),
+            create_sharding(config, grounds),
             fps=FPS,
             ids=config.person_numbers,
         )

@@ -9,7 +9,7 @@ from server.media.letterbox import Letterbox
 from server.messaging.picture_motion import moved_homography
 from server.service.calibration.floor_map import floor_coverage
 from server.service.facade.errors import UnknownCameraError
-from server.service.identity.sharding import share_address
+from server.service.identity.sharding import shard_address
 from server.service.ingest.camera_state import CameraState
 from server.service.metrics.camera_metrics import CameraProblem, RecentSeconds
 from server.service.pipeline import BestViewPipeline
@@ -120,7 +120,7 @@ class CameraService:
         if camera in self._pipeline.frame_buffers:
             return None
         areas = [number for number, area in enumerate(share.areas) if camera in area.cameras]
-        return share_address(areas[0], share) if areas else None
+        return shard_address(areas[0], share) if areas else None
 
     def list_cameras(self) -> list[CameraInfo]:
         """Return each camera's state, as far as any viewer may know it."""

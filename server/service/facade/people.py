@@ -14,7 +14,7 @@ from server.service.facade.errors import (
     UnknownObjectError,
 )
 from server.service.facade.view_selection import ViewSelection, view_selection_of
-from server.service.identity.sharding import replacement_addresses, share_address
+from server.service.identity.sharding import replacement_addresses, shard_address
 from server.service.ingest.ingest import Thumbnail
 from server.service.pipeline import BestViewPipeline
 from server.service.view_selection.delay_modes import DelayMode
@@ -142,8 +142,8 @@ class PeopleService:
         return [
             RemotePerson(
                 number,
-                share_address(people.of_service.share_of(number), share),
-                people.of_service.is_visible_elsewhere(number),
+                shard_address(people.sharding.shard_of(number), share),
+                people.sharding.is_visible_elsewhere(number),
             )
             for number in people.of_other_shards
         ]
@@ -156,12 +156,12 @@ class PeopleService:
     def shard_of(self, number: int) -> Shard:
         """Return the service that a number belongs to, whether or not it is in use."""
         share = self._pipeline.config.view.share
-        index = self._pipeline.decider.people.of_service.share_of(number)
-        return Shard(index, index == share.share, share_address(index, share), bool(share.areas))
+        index = self._pipeline.decider.people.sharding.shard_of(number)
+        return Shard(index, index == share.share, shard_address(index, share), bool(share.areas))
 
     def is_reported(self, number: int) -> bool:
         """Return whether this service tells other systems about a person; of several areas the first does."""
-        return self._pipeline.decider.people.of_service.is_reported(number)
+        return self._pipeline.decider.people.sharding.is_reported(number)
 
     def current_number(self, number: int) -> int:
         """Return the current number of a merged one, as far as decisions have been published."""

@@ -21,7 +21,7 @@ from server.service.identity.manual_overrides import ManualOverrides, numbers_of
 from server.service.identity.numbered_boxes import numbered_boxes
 from server.service.identity.person_registry import PersonRegistry
 from server.service.identity.published_tracks import PublishedTracks
-from server.service.identity.sharding import ALL_PEOPLE, PeopleOfService, TracksOfPeople
+from server.service.identity.sharding import SINGLE_SHARD, Sharding, TracksOfPeople
 from server.service.identity.track_parts import (
     UNCONFIRMED,
     UNKNOWN,
@@ -46,7 +46,7 @@ _RECENT_S = 4.0
 class PersonTracker:
     """Associates the cameras' tracks epoch by epoch, and keeps recent boxes.
 
-    ``homographies`` map each camera's image to the ground; None where there is none. ``of_service`` says
+    ``homographies`` map each camera's image to the ground; None where there is none. ``sharding`` says
     which people are this service's; identities are computed for all people in the cameras' views. Tracks are
     final ``lag`` frames before an epoch's end, and are associated up to there. ``overhead`` are the
     cameras that look straight down, ``joint_cameras`` those that are tracked jointly where they overlap;
@@ -60,7 +60,7 @@ class PersonTracker:
         homographies: Mapping[str, NDArray[np.float64] | None],
         site_size: tuple[int, int],
         lag: int,
-        of_service: PeopleOfService = ALL_PEOPLE,
+        sharding: Sharding = SINGLE_SHARD,
         overhead: Collection[str] = (),
         fps: float = 25.0,
         joint_cameras: Sequence[str] = (),
@@ -75,7 +75,7 @@ class PersonTracker:
         """Frames unseen after which people are forgotten."""
         self.registry = PersonRegistry(settings.maximum_departed_people)
         """All people, those of other shards included."""
-        self.of_service = of_service
+        self.sharding = sharding
         """Which of the people are this service's."""
         self._histories = {camera: WindowHistory[CameraWindow]() for camera in cameras}
         self._lag, self._recent, self._compared = lag, frames_in(_RECENT_S, fps), frames_in(_COMPARED_S, fps)
@@ -150,12 +150,12 @@ class PersonTracker:
     @property
     def known(self) -> list[int]:
         """The numbers of this shard's people, in order; departed ones included."""
-        return self.of_service.own(self.registry.all_numbers, self.registry.merged)
+        return self.sharding.own(self.registry.all_numbers, self.registry.merged)
 
     @property
     def of_other_shards(self) -> list[int]:
         """The numbers of the other shards' people, in order."""
-        return self.of_service.others(self.registry.all_numbers, self.registry.merged)
+        return self.sharding.others(self.registry.all_numbers, self.registry.merged)
 
     def reserve_numbers_below(self, number: int) -> None:
         """Assign no number below this one: an earlier run has used them."""
@@ -313,7 +313,7 @@ class PersonTracker:
                 is_known = bool(parts) and first <= last and parts[-1].number != UNCONFIRMED
                 numbers.append(parts[-1].number if is_known else None)
             seen.append(TracksOfPeople(window.message, numbers))
-        self.of_service.update(seen, now)
+        self.sharding.update(seen, now)
 
     def _recall(self, own: Sequence[CameraWindow], joint: Sequence[CameraWindow], epoch: Epoch) -> None:
         """Assign expected tracks to their people of an earlier run when they first appear."""
@@ -332,7 +332,7 @@ class PersonTracker:
 
     def _replace(self, numbers: Mapping[int, int]) -> None:
         """Replace numbers in the tracks."""
-        self.of_service.renumber(numbers)
+        self.sharding.renumber(numbers)
         self._id_switch_repair.merge(numbers)
         replace_numbers(self._parts, numbers)
 
@@ -344,4 +344,4 @@ class PersonTracker:
             self._reader.local_numbers.forget(key)
         self._ground.keep_only(self._last_reported)
         self.registry.forget_unseen_since(now - self.forget_after)
-        self.of_service.keep_only(self.registry.first_seen.keys())
+        self.sharding.keep_only(self.registry.first_seen.keys())

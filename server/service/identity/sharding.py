@@ -1,4 +1,7 @@
-"""Distributes people over the best-view services of one site: by their numbers, or by where they are."""
+"""Sharding: how the best-view services of one site divide its people, by number or by where they are.
+
+A shard is a share of the people (`view.share` of the configuration); several services may have the same.
+"""
 
 from __future__ import annotations
 
@@ -43,8 +46,8 @@ class OtherArea:
     is_visible: bool
 
 
-class PeopleOfService(Protocol):
-    """Which of the people whom it knows a service decides for; the others are other services'."""
+class Sharding(Protocol):
+    """Divides a site's people into shards, and tells which of them this service decides for."""
 
     def own(self, numbers: Iterable[int], merged: Mapping[int, int]) -> list[int]:
         """Return the numbers that belong to the service, in the given order.
@@ -57,8 +60,8 @@ class PeopleOfService(Protocol):
         """Return the numbers of other services' people, of those known here or by what they say."""
         ...
 
-    def share_of(self, number: int) -> int:
-        """Return the share that a number belongs to, as far as is known."""
+    def shard_of(self, number: int) -> int:
+        """Return the index of the shard that a number belongs to, as far as is known."""
         ...
 
     def is_visible_elsewhere(self, number: int) -> bool | None:
@@ -82,14 +85,14 @@ class PeopleOfService(Protocol):
         ...
 
 
-class PeopleByNumber:
-    """People are divided by number, the same in all services, without communication."""
+class ShardingByNumber:
+    """Divides people by number, the same in all services, without communication."""
 
     def __init__(self, share: ShareSettings) -> None:
         self._share = share
 
     def own(self, numbers: Iterable[int], merged: Mapping[int, int]) -> list[int]:
-        """Return the numbers of the share.
+        """Return the numbers of the shard.
 
         Besides its own these are people into whom one of them was merged, so that viewers of the old number
         need not change the service.
@@ -99,13 +102,13 @@ class PeopleByNumber:
         return [number for number in numbers if number % of == share or number in kept_numbers]
 
     def others(self, numbers: Iterable[int], merged: Mapping[int, int]) -> list[int]:
-        """Return the numbers of the other shares, in the given order."""
+        """Return the numbers of the other shards, in the given order."""
         every = list(numbers)
         own = set(self.own(every, merged))
         return [number for number in every if number not in own]
 
-    def share_of(self, number: int) -> int:
-        """Return the share of a number, whether or not it is in use."""
+    def shard_of(self, number: int) -> int:
+        """Return the shard of a number, whether or not it is in use."""
         return number % self._share.of
 
     def is_visible_elsewhere(self, number: int) -> None:
@@ -119,18 +122,18 @@ class PeopleByNumber:
         """Ignore where people are."""
 
     def renumber(self, numbers: Mapping[int, int]) -> None:
-        """Ignore it: numbers stay in their share."""
+        """Ignore it: numbers stay in their shard."""
 
     def keep_only(self, numbers: Collection[int]) -> None:
         """Ignore it: nothing is known about single people."""
 
 
-ALL_PEOPLE = PeopleByNumber(ShareSettings())
+SINGLE_SHARD = ShardingByNumber(ShareSettings())
 """A single service has all people."""
 
 
-class PeopleOfArea:
-    """People are divided by area. Who is at a border is known to both services, under one number.
+class ShardingByArea:
+    """Divides people by area. Who is at a border is known to both services, under one number.
 
     Somebody is in the area where most of the cameras say they are (`ServiceArea.votes`), or half of them
     while no other service has them: each knows only some of the cameras. A service from which another one
@@ -160,7 +163,7 @@ class PeopleOfArea:
         """Return the numbers of people whom other services say they have, in order."""
         return sorted(number for number in self._elsewhere if number not in self._seen)
 
-    def share_of(self, number: int) -> int:
+    def shard_of(self, number: int) -> int:
         """Return the area where somebody is; this one if nobody else says that they are there."""
         if number in self._seen or number not in self._elsewhere:
             return self._share.share
@@ -197,7 +200,7 @@ class PeopleOfArea:
             return False
         return (-other.here, other.area) < (-last, self._share.share)
 
-    def hear(self, elsewhere: Mapping[int, OtherArea]) -> None:
+    def set_other_areas(self, elsewhere: Mapping[int, OtherArea]) -> None:
         """Replace what other services say about who is in their areas, by number."""
         self._elsewhere = dict(elsewhere)
 
@@ -210,16 +213,16 @@ class PeopleOfArea:
         self._seen = {number: last for number, last in self._seen.items() if number in numbers}
 
 
-def people_of_service(config: Config, homographies: Mapping[str, Floats | None]) -> PeopleOfService:
+def create_sharding(config: Config, homographies: Mapping[str, Floats | None]) -> Sharding:
     """Return how a site's services divide its people; `homographies` by camera, from its own picture."""
     share = config.view.share
     if not share.areas:
-        return PeopleByNumber(share)
-    return PeopleOfArea(share, ServiceArea(share, homographies, config.site.size), config.site.fps)
+        return ShardingByNumber(share)
+    return ShardingByArea(share, ServiceArea(share, homographies, config.site.size), config.site.fps)
 
 
 def replacement_addresses(share: ShareSettings) -> list[str]:
-    """Return the addresses of the other services of this one's share."""
+    """Return the addresses of the other services of this shard."""
     return [
         server.rstrip("/") + "/"
         for index, server in enumerate(share.servers)
@@ -227,6 +230,6 @@ def replacement_addresses(share: ShareSettings) -> list[str]:
     ]
 
 
-def share_address(number: int, share: ShareSettings) -> str | None:
-    """Return the address of the first service of a share; None where the configuration has none."""
+def shard_address(number: int, share: ShareSettings) -> str | None:
+    """Return the address of the first service of a shard; None where the configuration has none."""
     return share.servers[number].rstrip("/") + "/" if share.servers else None

@@ -13,7 +13,7 @@ from server.messaging.camera_identity_snapshot import PERSON_NUMBER_MAX
 from server.messaging.service_record import ServiceRecord, Stay
 from server.service.identity.local_numbers import TrackName
 from server.service.identity.people import PersonTracker
-from server.service.identity.sharding import OtherArea, PeopleOfArea
+from server.service.identity.sharding import OtherArea, ShardingByArea
 from server.service.identity.track_parts import UNCONFIRMED
 from server.service.replication.disagreements import (
     Disagreements,
@@ -57,8 +57,8 @@ class AreaAgreement:
 
     def present(self) -> dict[int, Stay]:
         """Return since when each person in the area has been known, by number, and was there."""
-        area, seen = self._people.of_service, self._people.registry.first_seen
-        if not isinstance(area, PeopleOfArea):
+        area, seen = self._people.sharding, self._people.registry.first_seen
+        if not isinstance(area, ShardingByArea):
             return {}
         return {
             number: Stay(first_seen=max(seen[number], 0), here=max(last, 0))
@@ -110,13 +110,13 @@ class AreaAgreement:
         Returns:
             The number of records by which a number has changed.
         """
-        area = self._people.of_service
-        if not isinstance(area, PeopleOfArea):
+        area = self._people.sharding
+        if not isinstance(area, ShardingByArea):
             return 0
         others = [record for record in live if self.is_other(record)]
         of = self._share.of
         last_area_first = sorted(others, key=lambda record: record.service % of, reverse=True)
-        area.hear(
+        area.set_other_areas(
             {
                 number: OtherArea(record.service % of, stay.here, record.pulse - stay.here <= self._unseen)
                 for record in last_area_first

@@ -15,7 +15,7 @@ from server.config.site_config import Config
 from server.messaging.messages import NumberedBox
 from server.service.identity.occupied_regions import OccupiedRegions, Regions
 from server.service.identity.people import PersonTracker
-from server.service.identity.sharding import people_of_service
+from server.service.identity.sharding import create_sharding
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.view_selection.current_shots import CurrentShots
 from server.service.view_selection.explanation import SelectionReasons
@@ -114,7 +114,7 @@ class ViewDecider:
             camera_homographies,
             size,
             config.track.final_lag(fps),
-            people_of_service(config, camera_homographies),
+            create_sharding(config, camera_homographies),
             config.overhead,
             fps,
             config.joint_cameras,

@@ -14,7 +14,7 @@ from fakes.service.scripted_cameras import CAMERAS, SMALL, FedService, TrackNumb
 from server.integrations.integrations import integrating
 from server.integrations.mqtt.site_state import person_key
 from server.messaging.messages import Box
-from server.service.identity.sharding import OtherArea, PeopleOfArea
+from server.service.identity.sharding import OtherArea, ShardingByArea
 from server.service.service import BestViewService
 
 pytestmark = [needs_mosquitto]
@@ -47,9 +47,9 @@ class TwoServices:
             self.pipelines.append(pipeline)
         self._epoch = 0
 
-    def areas(self) -> list[PeopleOfArea]:
-        found = [pipeline.decider.people.of_service for pipeline in self.pipelines]
-        return [area for area in found if isinstance(area, PeopleOfArea)]
+    def areas(self) -> list[ShardingByArea]:
+        found = [pipeline.decider.people.sharding for pipeline in self.pipelines]
+        return [area for area in found if isinstance(area, ShardingByArea)]
 
     def feed(self, epochs: int, seen: Mapping[str, Mapping[int, Box | None]]) -> None:
         """Let both cameras see people for some epochs, and the services say to each other who is there."""
@@ -60,7 +60,7 @@ class TwoServices:
             there = [dict(area.present) for area in self.areas()]
             for index, area in enumerate(self.areas()):
                 other = 1 - index
-                area.hear(
+                area.set_other_areas(
                     {number: OtherArea(other, here, is_visible=True) for number, here in there[other].items()}
                 )
 

@@ -36,7 +36,7 @@ from fakes.system.ports import free_port
 from fakes.timeouts import PATIENCE
 from server.media.picture import Codec
 from server.messaging.epochs import end_of_epoch
-from server.service.identity.sharding import OtherArea, PeopleOfArea
+from server.service.identity.sharding import OtherArea, ShardingByArea
 
 pytestmark = needs_gstreamer
 
@@ -327,11 +327,11 @@ async def test_a_client_stays_when_somebody_walks_into_another_area(
             run_gateway(west.port) as gateway,
             watching(gateway.url("/objects/1", token_of("desk"))) as frames,
         ):
-            area = west.service.decider.people.of_service
-            assert isinstance(area, PeopleOfArea)
+            area = west.service.decider.people.sharding
+            assert isinstance(area, ShardingByArea)
             await more(frames, FPS)
             assert east.service.splicer.viewers == 0
-            area.hear({1: OtherArea(1, 1_000_000, is_visible=True)})
+            area.set_other_areas({1: OtherArea(1, 1_000_000, is_visible=True)})
             monkeypatch.setattr(area, "hear", lambda _: None)  # and the other service says so from now on
             await until(lambda: east.service.splicer.viewers == 1)
             await more(frames, 2 * FPS)

@@ -21,7 +21,7 @@ from server.messaging.messages import CameraTracks
 from server.messaging.observations import FrameObservations, unpack_observations
 from server.messaging.packed_arrays import pack_detections, pack_histograms
 from server.service.identity.service_area import ServiceArea, area_to_take_in
-from server.service.identity.sharding import OtherArea, PeopleOfArea, TracksOfPeople
+from server.service.identity.sharding import OtherArea, ShardingByArea, TracksOfPeople
 from server.service.service import BestViewService
 from server.system.errors import UserError
 
@@ -84,7 +84,7 @@ class TwoAreas:
 
     def __init__(self, *, floor: bool = True) -> None:
         self.areas = [
-            PeopleOfArea(
+            ShardingByArea(
                 share(index, floor=floor),
                 ServiceArea(share(index, floor=floor), dict.fromkeys(CAMERAS, GROUND), SIZE),
                 25.0,
@@ -100,7 +100,7 @@ class TwoAreas:
                 for number, last in self.areas[1 - index].present.items()
             }
             area.update([TracksOfPeople(message, [7]) for message in seen], frame)
-            area.hear(other)
+            area.set_other_areas(other)
         return [index for index, area in enumerate(self.areas) if area.own([7], {})]
 
 
@@ -115,7 +115,7 @@ def test_who_walks_into_another_area_is_in_both_and_then_there() -> None:
     assert at_place(50, 150.0) == [0, 1]
     assert at_place(60, 150.0) == [1]
     assert both.areas[0].others([7], {}) == [7]
-    assert [area.share_of(7) for area in both.areas] == [1, 1]
+    assert [area.shard_of(7) for area in both.areas] == [1, 1]
 
 
 @pytest.mark.parametrize("floor", [True, False])
@@ -137,7 +137,7 @@ def test_without_floors_who_is_seen_by_a_camera_of_each_area_ends_in_one() -> No
 
 
 def test_nobody_leaves_an_area_before_another_has_them() -> None:
-    area = PeopleOfArea(share(0), ServiceArea(share(0), dict.fromkeys(CAMERAS, GROUND), SIZE), 25.0)
+    area = ShardingByArea(share(0), ServiceArea(share(0), dict.fromkeys(CAMERAS, GROUND), SIZE), 25.0)
     area.update([TracksOfPeople(seen("c0", 0, 50.0), [3])], 0)
     area.update([TracksOfPeople(seen("c0", 0, 110.0), [3])], 500)
     assert area.own([3], {}) == [3]
@@ -208,9 +208,9 @@ async def west_service() -> AsyncIterator[str]:
     service.connect_cameras("c0")
     for epoch in range(4):
         service.feed(epoch, {"c0": {1: SMALL}})
-    area = service.decider.people.of_service
-    assert isinstance(area, PeopleOfArea)
-    area.hear({2: OtherArea(1, 0, is_visible=True), 4: OtherArea(1, 0, is_visible=False)})
+    area = service.decider.people.sharding
+    assert isinstance(area, ShardingByArea)
+    area.set_other_areas({2: OtherArea(1, 0, is_visible=True), 4: OtherArea(1, 0, is_visible=False)})
     async with serving(make_app(BestViewService(service)), HttpSettings(port=0)) as port:
         yield f"http://127.0.0.1:{port}"
     service.close()

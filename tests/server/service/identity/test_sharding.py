@@ -32,7 +32,7 @@ from server.config.sections import HttpSettings, ShareSettings
 from server.http.app import make_app, serving
 from server.messaging.bus import Bus
 from server.messaging.messages import Box, ZenohKeys
-from server.service.identity.sharding import PeopleByNumber, share_address
+from server.service.identity.sharding import ShardingByNumber, shard_address
 from server.service.pipeline import BestViewPipeline
 from server.service.service import BestViewService
 from server.service.view_selection.decider import ViewDecider
@@ -74,12 +74,12 @@ def test_shards_together_decide_as_a_single_service(of: int, seed: int) -> None:
 
 
 def test_viewers_of_a_merged_number_stay_at_their_service() -> None:
-    people = PeopleByNumber(ShareSettings(of=3, index=2))
+    people = ShardingByNumber(ShareSettings(of=3, index=2))
     assert people.own([1, 2, 4, 5], {}) == [2, 5]
     assert people.own([1, 4], {5: 4}) == [4]
     assert people.own([1, 2], {8: 7}) == [2]
     assert people.others([1, 4, 7], {5: 4}) == [1, 7]
-    assert [people.share_of(number) for number in (3, 4, 5)] == [0, 1, 2]
+    assert [people.shard_of(number) for number in (3, 4, 5)] == [0, 1, 2]
 
 
 def test_a_merged_numbers_stream_continues_at_its_own_service() -> None:
@@ -132,8 +132,8 @@ def test_an_invalid_share_is_refused_in_one_line(share: dict[str, Any], reason: 
 
 def test_shard_addresses_are_normalized_to_base_urls() -> None:
     share = ShareSettings(of=2, servers=["http://a:1", "https://b/myview/"])
-    assert (share_address(0, share), share_address(1, share)) == ("http://a:1/", "https://b/myview/")
-    assert share_address(1, ShareSettings(of=2)) is None
+    assert (shard_address(0, share), shard_address(1, share)) == ("http://a:1/", "https://b/myview/")
+    assert shard_address(1, ShareSettings(of=2)) is None
 
 
 @pytest.fixture(params=[["http://one:1/", "http://two/x"], []])

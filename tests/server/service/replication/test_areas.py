@@ -114,7 +114,7 @@ class TestAgreement:
             there = self.record(1, pulse, {}, {77: 0})
             stays = {77: Stay(first_seen=0, here=20)}
             agreement.step({}, [msgspec.structs.replace(there, in_area=stays)])
-            assert people.of_service.is_visible_elsewhere(77) is is_visible
+            assert people.sharding.is_visible_elsewhere(77) is is_visible
         assert people.of_other_shards == [77], "they belong to it nevertheless"
 
     @pytest.mark.parametrize("area", [0, 1, 2])
@@ -132,7 +132,7 @@ class TestAgreement:
         others = [self.record(other, 20, {1: 1}, {1: 0}) for other in range(3) if other != area]
         for live in (others, others[::-1]):
             agreement.step({}, live)
-            assert people.of_service.is_reported(1) is (area == 0)
+            assert people.sharding.is_reported(1) is (area == 0)
         service.close()
 
     def test_numbers_that_another_service_remembers_are_not_assigned_again(
