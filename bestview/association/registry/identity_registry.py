@@ -226,14 +226,14 @@ class IdentityRegistry:
         """Add people whom another run remembers, before their first track is observed here."""
         self._people.restore(people)
 
-    def see_elsewhere(
+    def add_remote_sightings(
         self, sightings: Iterable[RemoteSighting], populations: Mapping[str, NDArray[np.float64]]
     ) -> None:
         """Add people whom other sites see or have seen: who arrives here can be one who has left there.
 
         `populations` are what `population` returns at these sites, by their names.
         """
-        self._people.see_elsewhere(sightings, populations)
+        self._people.add_remote_sightings(sightings, populations)
 
     def population(self, bins: int) -> NDArray[np.float64]:
         """Return the sum of the (B,) histograms of all tracks: how this site's cameras render people."""

@@ -172,7 +172,7 @@ class PersonStore:
         self._reserve_after(person_id)
         self._by_id.setdefault(person_id, Person(person_id, frame))
 
-    def see_elsewhere(
+    def add_remote_sightings(
         self, sightings: Iterable[RemoteSighting], populations: Mapping[str, NDArray[np.float64]]
     ) -> None:
         """Add what other sites know about people, and how they render them, by site."""
@@ -180,7 +180,7 @@ class PersonStore:
             self._reidentifier.populations.put(site, population)
         for sighting in sightings:
             unknown = Person(sighting.person_id, departed=True, elsewhere=True)
-            self._by_id.setdefault(sighting.person_id, unknown).see_elsewhere(sighting)
+            self._by_id.setdefault(sighting.person_id, unknown).add_remote_sighting(sighting)
 
     @property
     def all_people(self) -> list[Person]:

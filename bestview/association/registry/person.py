@@ -48,7 +48,7 @@ class Person:
             self.last_frame, self.camera = frame, camera
             self.elsewhere = self.visible_elsewhere = False
 
-    def see_elsewhere(self, sighting: RemoteSighting) -> None:
+    def add_remote_sighting(self, sighting: RemoteSighting) -> None:
         """Record that another site sees the person, unless this one has seen them since."""
         if sighting.looks is not None:
             self.remote_looks[sighting.site] = sighting.looks

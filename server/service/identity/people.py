@@ -94,16 +94,16 @@ class PersonTracker:
         self.newest = -1
         """The last frame of the newest epoch; -1: none."""
         self._thread = AssociationThread()
-        self._begun: EpochAssociation | None = None
+        self._association: EpochAssociation | None = None
         """The newest association, whether or not it has ended."""
 
     def update(self, epoch: Epoch) -> Sequence[CameraWindow]:
         """Associate an epoch's tracks, unless that was done; return its windows, late revisions first."""
-        begun = self._begun
-        if begun is None or begun.last != epoch.last:
-            begun = self._begin(epoch, run_here)
+        newest = self._association
+        if newest is None or newest.last != epoch.last:
+            newest = self._begin(epoch, run_here)
         self.finish_association()
-        return [*begun.late, *begun.windows]
+        return [*newest.late, *newest.windows]
 
     async def associate(self, epoch: Epoch) -> None:
         """Associate an epoch's tracks in a thread, for which changes wait; `update` returns the result."""
@@ -122,20 +122,20 @@ class PersonTracker:
             tracks += self._ground.updates(epoch.joint.tracks, [window.message for window in joint])
         since = max(self.newest + 1, epoch.last + 1 - self._recent)  # epochs may have been skipped
         image_sizes = self.undetected.detecting_cameras(windows, since - self._lag, epoch.last - self._lag)
-        association = partial(self._registry.update, tracks, epoch.last - self._lag, image_sizes)
-        self._begun = EpochAssociation(epoch.last, late, windows, run(association))
-        return self._begun
+        associate = partial(self._registry.update, tracks, epoch.last - self._lag, image_sizes)
+        self._association = EpochAssociation(epoch.last, late, windows, run(associate))
+        return self._association
 
     def finish_association(self) -> None:
         """Wait for the end of a running association, and take its result."""
-        begun = self._begun
-        if begun is None or begun.is_taken:
+        newest = self._association
+        if newest is None or newest.is_taken:
             return
-        begun.is_taken, self.newest = True, begun.last
-        update = self.overrides.apply(begun.numbers.result())
+        newest.is_taken, self.newest = True, newest.last
+        update = self.overrides.apply(newest.numbers.result())
         update_parts(self._parts, update.person_ids, self._needed_from)
         self._id_switch_repair.overlay(self._parts)
-        self._record_visible(begun.windows, self.newest)
+        self._record_visible(newest.windows, self.newest)
         self.registry.update_presence(update.departed, update.returned)
         for merge in update.merged:
             self._merge(merge.kept, merge.lost)
@@ -156,10 +156,6 @@ class PersonTracker:
     def of_other_shards(self) -> list[int]:
         """The numbers of the other shards' people, in order."""
         return self.sharding.others(self.registry.all_numbers, self.registry.merged)
-
-    def reserve_numbers_below(self, number: int) -> None:
-        """Assign no number below this one: an earlier run has used them."""
-        self.identity.reserve_below(number)
 
     def expect(self, tracks: Mapping[TrackName, int], last_pulse: int) -> None:
         """Expect tracks that belonged to these people in an earlier run, which ended with `last_pulse`."""

@@ -153,7 +153,7 @@ class StateRecovery:
 
     def begin(self, people: PersonTracker, pulse: int) -> None:
         """Assign the pending tracks to their people before any of them is reported."""
-        people.reserve_numbers_below(self.next_number)
+        people.identity.reserve_below(self.next_number)
         people.expect(self._tracks, pulse - 1)
 
     def advance(self, people: PersonTracker, pulse: int) -> None:

@@ -113,7 +113,7 @@ class StateReplication:
         snapshot = msgspec.msgpack.decode(message.payload, type=CameraIdentitySnapshot)
         self._first_free[camera] = first_free_number(snapshot, self._people.ids)
         if is_repeated:
-            self._people.reserve_numbers_below(
+            self._people.identity.reserve_below(
                 min(snapshot.next_number, trusted_first_free(self._first_free.values()))
             )
         else:

@@ -233,7 +233,7 @@ class OtherSites:
         self.elsewhere.forget(gone)
         own = [person.number for person in people if self._people.ids.has(person.number)]
         most = max(SINGLE_CAMERA_NUMBER_MAX, self._people.identity.next_id)
-        self._people.reserve_numbers_below(min(max(own, default=0) + 1, most))
+        self._people.identity.reserve_below(min(max(own, default=0) + 1, most))
         looks = self.elsewhere.looks_of(site, told.looks)
         sightings = [
             person.sighting(looks.pop(person.number, None))
@@ -244,7 +244,7 @@ class OtherSites:
             self.elsewhere.by_number[number].sighting(histogram) for number, histogram in looks.items()
         ]
         populations = {} if site.population is None else {site.name: site.population}
-        self._people.identity.see_elsewhere(sightings, populations)
+        self._people.identity.add_remote_sightings(sightings, populations)
 
     def _is_contested(self, site: LinkedSite, person: PersonElsewhere) -> bool:
         """Return whether a person is here, too; where they arrived later they get a new number."""
@@ -289,7 +289,7 @@ class OtherSites:
         for site in self.sites.values():
             if site.heard_at is not None and not site.is_there(now, SILENT_S):
                 left = self.elsewhere.leave_silent_site(site)
-                self._people.identity.see_elsewhere([person.sighting() for person in left], {})
+                self._people.identity.add_remote_sightings([person.sighting() for person in left], {})
             elif (
                 site.heard_at is None
                 and not (site.refused or site.is_missed)

@@ -79,7 +79,7 @@ class AreaAgreement:
         if not self.is_other(record) or len(record.next_numbers) != len(self._next_numbers):
             return
         self._next_numbers = [max(each) for each in zip(self._next_numbers, record.next_numbers, strict=True)]
-        self._people.reserve_numbers_below(record.next_numbers[self._share.share])
+        self._people.identity.reserve_below(record.next_numbers[self._share.share])
 
     def receive(self, record: ServiceRecord) -> None:
         """Keep a record of another area until this service is at its pulse."""

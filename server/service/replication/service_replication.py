@@ -256,7 +256,7 @@ class ServiceReplication:
         """Skip the numbers that another service has assigned and this one has not."""
         ahead = _next_number(other) - _next_number(own)
         if 0 < ahead <= _NUMBERS_AHEAD_MAX:
-            self._people.reserve_numbers_below(self._people.identity.next_id + ahead)
+            self._people.identity.reserve_below(self._people.identity.next_id + ahead)
 
     def _leading(self) -> ServiceRecord | None:
         """Return the record of the leading service; None: this one leads."""

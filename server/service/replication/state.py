@@ -39,7 +39,7 @@ def state_of(people: PersonTracker, record: ServiceRecord) -> ServiceState:
 def restore_people(people: PersonTracker, state: ServiceState) -> None:
     """Add what another service knows about people, before any of their tracks is reported here."""
     own = [person.number for person in state.people if people.ids.has(person.number)]
-    people.reserve_numbers_below(max(own, default=0) + 1)
+    people.identity.reserve_below(max(own, default=0) + 1)
     people.identity.restore(_person(person) for person in state.people if person.looks)
     for person in state.people:
         seen = person.first_seen, person.last_seen

@@ -76,7 +76,7 @@ class Site:
             )
             for person in own
         ]
-        other.registry.see_elsewhere(sightings, {self.name: self.registry.population(BINS)})
+        other.registry.add_remote_sightings(sightings, {self.name: self.registry.population(BINS)})
 
 
 def walk_between(
@@ -186,9 +186,9 @@ def test_travel_times_between_sites_tell_people_with_similar_looks_apart() -> No
         now = count * STRIDE - 1
         for n, (left, sighting) in enumerate(learned):
             if now == left + 4:
-                registry.see_elsewhere([replace(sighting, looks=looks_of(1.0 + n / 2))], {})
+                registry.add_remote_sightings([replace(sighting, looks=looks_of(1.0 + n / 2))], {})
         if now == late + 4:
-            registry.see_elsewhere(
+            registry.add_remote_sightings(
                 [
                     RemoteSighting(101, "hall", "exit", late, is_visible=False, looks=looks_of(1.5)),
                     RemoteSighting(103, "hall", "exit", old, is_visible=False, looks=looks_of(1.6)),
@@ -215,7 +215,7 @@ def test_series_share_no_id_and_leave_none_out(step: int, least: int) -> None:
 
 def test_ids_of_other_sites_do_not_raise_the_own_ones() -> None:
     registry = IdentityRegistry(IdentitySettings(), BLIND, ids=IdSeries(0, 2))
-    registry.see_elsewhere([RemoteSighting(10**8, "yard", "c0", 0, is_visible=False)], {})
+    registry.add_remote_sightings([RemoteSighting(10**8, "yard", "c0", 0, is_visible=False)], {})
     registry.forget([10**8])
     assert registry.next_id == 1
     registry.reserve_below(8)
@@ -225,7 +225,7 @@ def test_ids_of_other_sites_do_not_raise_the_own_ones() -> None:
 @pytest.mark.parametrize("is_newer", [True, False])
 def test_merging_somebody_elsewhere_brings_no_camera_of_another_site(*, is_newer: bool) -> None:
     here, gone = Person(1, 50, "south"), Person(2)
-    gone.see_elsewhere(RemoteSighting(2, "yard", "c0", 90 if is_newer else 10, is_visible=False))
+    gone.add_remote_sighting(RemoteSighting(2, "yard", "c0", 90 if is_newer else 10, is_visible=False))
     here.merge(gone)
     assert here.last_sighting == CameraSighting("south", 50)
     assert not here.elsewhere

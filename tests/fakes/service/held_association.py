@@ -24,7 +24,7 @@ def hold(tracker: PersonTracker) -> threading.Event:
 
 def release_when_waited_for(tracker: PersonTracker, released: threading.Event) -> None:
     """Release the running association as soon as somebody waits for its result."""
-    running = tracker._begun
+    running = tracker._association
     assert running is not None
     result = running.numbers.result
 

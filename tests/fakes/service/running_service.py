@@ -78,7 +78,7 @@ class RunningService(FedService):
     async def process(self) -> None:
         """Let the service's tasks run."""
         for _ in range(50):
-            begun = self.decider.people._begun
+            begun = self.decider.people._association
             if begun is not None and not begun.is_taken:
                 await begun.wait()
             await asyncio.sleep(0)

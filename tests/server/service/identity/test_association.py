@@ -72,7 +72,7 @@ CHANGES: dict[str, Callable[[PersonTracker], object]] = {
     "split": lambda tracker: tracker.split_off(1, ["c1"]),
     "forget": lambda tracker: tracker.forget([2]),
     "renumber": lambda tracker: tracker.renumber({1: 7}),
-    "reserve": lambda tracker: tracker.reserve_numbers_below(40),
+    "reserve": lambda tracker: tracker.identity.reserve_below(40),
 }
 
 

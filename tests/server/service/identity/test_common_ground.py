@@ -80,7 +80,7 @@ def test_people_are_recalled_by_the_cameras_own_tracks_after_a_restart_of_the_se
     walks = walk_past()
     epochs = list(walked_epochs(walks))
     people = person_tracker()
-    people.reserve_numbers_below(9)
+    people.identity.reserve_below(9)
     people.expect({TrackName("c1", 1, 1): 7, TrackName("c2", 1, 2): 5}, -1)
     follow(people, epochs)
     assert numbers_of(people, walks, 30) == [{7}, {5}]

@@ -140,7 +140,7 @@ class TestAgreement:
     ) -> None:
         people = service.decider.people
         reserved: list[int] = []
-        monkeypatch.setattr(people, "reserve_numbers_below", reserved.append)
+        monkeypatch.setattr(people.identity, "reserve_below", reserved.append)
         agreement = AreaAgreement(service.config.view.share, people, 25.0)
         agreement.receive(self.record(1, 20, {}, {}))
         assert agreement.next_numbers[1] == 31
