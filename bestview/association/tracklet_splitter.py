@@ -205,7 +205,7 @@ class TrackletSplitter:
         }
 
     def forget(self, people: Collection[int]) -> None:
-        """Forget people: their tracks start anew with the next observation, without a past and without looks.
+        """Forget people: their tracks start anew with the next observation, without past and appearance.
 
         Their active tracklets stay as rows until they are settled, but say nothing about anybody.
         """

@@ -81,7 +81,7 @@ class ServiceRecord(msgspec.Struct, frozen=True, kw_only=True):
         return self.unbroken_since, self.service
 
 
-class CameraLooks(msgspec.Struct, frozen=True, kw_only=True):
+class CameraHistogram(msgspec.Struct, frozen=True, kw_only=True):
     """A person's color histograms in one camera."""
 
     frames: Annotated[int, msgspec.Meta(ge=1, le=2**40)]
@@ -102,7 +102,9 @@ class PersonState(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     """Frames behind the histograms that were published with this number."""
     aliases: Annotated[list[PersonNumber], msgspec.Meta(max_length=ALIASES_MAX)] = []
     name: Annotated[str, msgspec.Meta(max_length=NAME_LENGTH_MAX)] = ""
-    looks: Annotated[dict[str, CameraLooks], msgspec.Meta(max_length=_CAMERAS_MAX)] = {}
+    histograms: Annotated[dict[str, CameraHistogram], msgspec.Meta(max_length=_CAMERAS_MAX)] = msgspec.field(
+        name="looks", default_factory=dict
+    )
     """By camera."""
 
 

@@ -22,8 +22,8 @@ MESSAGE_BYTES_MAX = 1 << 16
 """Size limit of a message in bytes."""
 PEOPLE_MAX = 250
 """People in a message."""
-LOOKS_MAX = 40
-"""People in a message whose looks it has."""
+HISTOGRAMS_MAX = 40
+"""People in a message whose histograms it has."""
 DELETIONS_MAX = 20
 """Deletions in a message."""
 VIEWERS_MAX = 256
@@ -45,7 +45,7 @@ PackedSightings = Annotated[bytes, msgspec.Meta(max_length=PEOPLE_MAX * _ROW.ite
 seconds for which they have been there, below 0 if they have left (float32 each); all little-endian."""
 
 
-class Looks(msgspec.Struct, frozen=True, kw_only=True):
+class PersonHistogram(msgspec.Struct, frozen=True, kw_only=True):
     """A person's mean color histogram over the site's cameras."""
 
     number: PersonNumber
@@ -122,7 +122,9 @@ class SitePeople(msgspec.Struct, frozen=True, kw_only=True):
     """When its numbers began: none was assigned twice since."""
     cameras: Annotated[list[_CameraName], msgspec.Meta(max_length=CAMERAS_MAX)]
     people: PackedSightings
-    looks: Annotated[list[Looks], msgspec.Meta(max_length=LOOKS_MAX)] = []
+    histograms: Annotated[list[PersonHistogram], msgspec.Meta(max_length=HISTOGRAMS_MAX)] = msgspec.field(
+        name="looks", default_factory=list
+    )
     population: Population | None = None
     deletions: Annotated[list[SiteDeletion], msgspec.Meta(max_length=DELETIONS_MAX)] = []
     viewers: Viewers | None = None

@@ -18,7 +18,7 @@ from server.messaging.inbox import Message
 from server.messaging.messages import ZenohKeys
 from server.messaging.packed_arrays import pack_histograms
 from server.messaging.site_people import (
-    Looks,
+    PersonHistogram,
     SiteDeletion,
     SitePeople,
     SiteSighting,
@@ -74,8 +74,8 @@ class OtherSitesMessages(ScriptTarget):
             numbered_since=float(rng.randrange(1, 3)),
             cameras=["c0"],
             people=pack_sightings(rows, ["c0"]),
-            looks=[
-                Looks(number=number, frames=25, histogram=pack_histograms(histogram))
+            histograms=[
+                PersonHistogram(number=number, frames=25, histogram=pack_histograms(histogram))
                 for number, histogram in zip(numbers, histograms, strict=True)
             ],
             population=pack_population(histograms.sum(axis=0) if numbers else np.zeros(_BINS)),

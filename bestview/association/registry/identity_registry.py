@@ -22,7 +22,7 @@ from bestview.association.registry.other_sites import (
     SINGLE_SITE,
     IdSeries,
     RemoteSighting,
-    looks_in_all_cameras,
+    sum_over_cameras,
 )
 from bestview.association.registry.people import PersonStore
 from bestview.association.registry.person import Person
@@ -239,14 +239,14 @@ class IdentityRegistry:
         """Return the sum of the (B,) histograms of all tracks: how this site's cameras render people."""
         return self._cross_camera.equalizer.population(bins)
 
-    def looks(self, people: Iterable[int]) -> dict[int, MeanHistogram]:
-        """Return how these people look in this site's cameras, by id, as far as it is known."""
+    def mean_histograms(self, people: Iterable[int]) -> dict[int, MeanHistogram]:
+        """Return these people's mean histograms over this site's cameras, by id, as far as known."""
         parts = {person_id: [self._people.appearance(person_id)] for person_id in people}
         for tracklet in self._splitter.active:
             if tracklet.person_id in parts:
                 parts[tracklet.person_id].append(tracklet.appearance)
-        found = {person_id: looks_in_all_cameras(each) for person_id, each in parts.items()}
-        return {person_id: looks for person_id, looks in found.items() if looks is not None}
+        found = {person_id: sum_over_cameras(each) for person_id, each in parts.items()}
+        return {person_id: histogram for person_id, histogram in found.items() if histogram is not None}
 
     def renumber(self, ids: Mapping[int, int]) -> None:
         """Replace ids by those of another run, one to one: by id, the new one, which nobody else has."""
@@ -258,7 +258,7 @@ class IdentityRegistry:
         self._visible_settled_ids = np.array(sorted(renumbered), dtype=np.int64)
 
     def forget(self, people: Collection[int]) -> None:
-        """Forget people: looks, sightings and tracks. Who is visible is confirmed anew, with another id."""
+        """Forget people: appearance, sightings, tracks. Who is visible is confirmed anew, with another id."""
         self._people.forget(people)
         self._splitter.forget(people)
         self._corrections.forget(people)

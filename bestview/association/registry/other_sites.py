@@ -1,8 +1,8 @@
 """People between sites: whose ids are whose, and what one site knows about people whom another one sees.
 
 Each site has a registry of its own. Ids are unique over all of them, since each assigns only those of its
-series. Looks travel as a person's mean histogram over the site's cameras, with that of all people of the
-site: if two sites see about the same people, the same coat is at the same quantiles in both.
+series. Appearance travels as a person's mean histogram over the site's cameras, with that of all people of
+the site: if two sites see about the same people, the same coat is at the same quantiles in both.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class RemoteSighting:
         camera: of that site, which has seen them last.
         frame: of the last sighting, in this site's frames.
         is_visible: whether the site sees them now.
-        looks: in the site's cameras; None: as known before.
+        histogram: mean over the site's cameras; None: as known before.
     """
 
     person_id: int
@@ -76,7 +76,7 @@ class RemoteSighting:
     camera: str
     frame: int
     is_visible: bool
-    looks: MeanHistogram | None = None
+    histogram: MeanHistogram | None = None
 
     @property
     def camera_name(self) -> str:
@@ -84,7 +84,7 @@ class RemoteSighting:
         return f"{self.site}/{self.camera}"
 
 
-def looks_in_all_cameras(appearances: Iterable[PersonAppearance]) -> MeanHistogram | None:
+def sum_over_cameras(appearances: Iterable[PersonAppearance]) -> MeanHistogram | None:
     """Add up what a site's cameras have seen of a person; None: nothing."""
     histograms = [
         histogram
@@ -126,14 +126,14 @@ class SitePopulations:
         Args:
             equalizer: of this site.
             new: N people here.
-            old: the looks of L people at other sites, by site.
+            old: the mean histograms of L people at other sites, by site.
         """
         total, count = np.zeros((len(new), len(old))), np.zeros((len(new), len(old)))
-        own = [looks_in_all_cameras([appearance]) for appearance in new]
+        own = [sum_over_cameras([appearance]) for appearance in new]
         for (site, bins), indices in _by_site(old).items():
             theirs, here = self.by_site.get((site, bins), np.zeros(bins)), equalizer.population(bins)
             weight = min(float(theirs.sum()), float(here.sum()))
-            rows = [i for i, looks in enumerate(own) if looks and looks.histogram_sum.size == bins]
+            rows = [i for i, mean in enumerate(own) if mean and mean.histogram_sum.size == bins]
             if not rows:
                 continue
             columns = list(indices)
@@ -150,8 +150,8 @@ def _by_site(
 ) -> Mapping[tuple[str, int], dict[int, MeanHistogram]]:
     """Return histograms by index of the person, by site and number of bins."""
     found: dict[tuple[str, int], dict[int, MeanHistogram]] = {}
-    for i, looks in enumerate(people):
-        for site, histogram in sorted(looks.items()):
+    for i, by_site in enumerate(people):
+        for site, histogram in sorted(by_site.items()):
             found.setdefault((site, histogram.histogram_sum.size), {})[i] = histogram
     return found
 

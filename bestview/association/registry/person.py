@@ -21,7 +21,7 @@ class Person:
         appearance: of the settled tracklets.
         settled_frames: their frames that were published with this id.
         unused_since: frame since which no cluster has the id; -1: one has it.
-        remote_looks: at other sites, by site.
+        remote_histograms: at other sites, by site.
         elsewhere: another site has seen them last; they take part in no clustering.
         visible_elsewhere: it sees them now, so that nobody here is them.
     """
@@ -33,7 +33,7 @@ class Person:
     appearance: PersonAppearance = field(default_factory=PersonAppearance)
     settled_frames: int = 0
     unused_since: int = -1
-    remote_looks: dict[str, MeanHistogram] = field(default_factory=dict)
+    remote_histograms: dict[str, MeanHistogram] = field(default_factory=dict)
     elsewhere: bool = False
     visible_elsewhere: bool = False
 
@@ -50,8 +50,8 @@ class Person:
 
     def add_remote_sighting(self, sighting: RemoteSighting) -> None:
         """Record that another site sees the person, unless this one has seen them since."""
-        if sighting.looks is not None:
-            self.remote_looks[sighting.site] = sighting.looks
+        if sighting.histogram is not None:
+            self.remote_histograms[sighting.site] = sighting.histogram
         if self.elsewhere or sighting.frame > self.last_frame:
             self.last_frame, self.camera = sighting.frame, sighting.camera_name
             self.elsewhere, self.visible_elsewhere = True, sighting.is_visible
@@ -62,4 +62,4 @@ class Person:
         if not other.elsewhere:
             self.add_sighting(other.camera, other.last_frame)
         self.settled_frames += other.settled_frames
-        self.remote_looks = other.remote_looks | self.remote_looks
+        self.remote_histograms = other.remote_histograms | self.remote_histograms

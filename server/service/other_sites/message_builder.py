@@ -12,9 +12,9 @@ from server.config.site_config import Config
 from server.messaging.packed_arrays import pack_histograms
 from server.messaging.site_people import (
     DELETIONS_MAX,
-    LOOKS_MAX,
+    HISTOGRAMS_MAX,
     PEOPLE_MAX,
-    Looks,
+    PersonHistogram,
     SiteDeletion,
     SitePeople,
     SiteSighting,
@@ -25,31 +25,31 @@ from server.messaging.site_people import (
 from server.service.identity.people import PersonTracker
 from server.service.other_sites.people_here import PeopleHere, PersonHere
 
-_LOOKS_BYTES = 1 << 14
-"""Bytes of looks in a message, at most."""
+_HISTOGRAM_BYTES = 1 << 14
+"""Bytes of histograms in a message, at most."""
 _DELETIONS_BYTES = 1 << 13
 """Bytes of the newest deletions in a message, and of older ones, at most; one of any size fits."""
-_LOOKS_EVERY = 3
-"""Messages after which the looks of somebody who is here are sent again, if they are known better."""
-_LOOKS_GROWTH = 1.25
+_HISTOGRAM_EVERY = 3
+"""Messages after which the histogram of somebody who is here is sent again, if it is of more frames."""
+_HISTOGRAM_GROWTH = 1.25
 """Factor by which their frames must have grown."""
 _REPEATED = 10
-"""People whose looks are repeated in each message, though nothing is new."""
+"""People whose histograms are repeated in each message, though nothing is new."""
 _VIEWERS_EVERY = 10
 """Messages between two lists of viewers, if none has changed."""
 
 
 @dataclass(slots=True)
 class _Sent:
-    """What was said about a person: at which message, and how many frames of looks at which."""
+    """What was said about a person: at which message, and how many frames of the histogram at which."""
 
     is_visible: bool
     at: int
     frames: int = 0
-    looks_at: int = -1
+    histogram_at: int = -1
     """-1: never."""
-    looks_visible: bool = True
-    """Whether they were here when their looks were sent."""
+    histogram_visible: bool = True
+    """Whether they were here when their histogram was sent."""
 
 
 class SiteMessageBuilder:
@@ -87,8 +87,8 @@ class SiteMessageBuilder:
         self._sent = {number: sent for number, sent in self._sent.items() if number in numbers}
         sightings = [self._sighting(person, pulse) for person in self._next_people(found)]
         cameras = sorted({sighting.camera for sighting in sightings})
-        looks = self._next_looks(found) if self._sites.share_looks else []
-        population = self._people.identity.population(self._bins) if looks else None
+        histograms = self._next_histograms(found) if self._sites.share_looks else []
+        population = self._people.identity.population(self._bins) if histograms else None
         is_due = viewers != self._viewers or self._count % _VIEWERS_EVERY == 1
         self._viewers = viewers
         return msgspec.msgpack.encode(
@@ -98,7 +98,7 @@ class SiteMessageBuilder:
                 numbered_since=numbered_since,
                 cameras=cameras,
                 people=pack_sightings(sightings, cameras),
-                looks=looks,
+                histograms=histograms,
                 population=None if population is None else pack_population(population),
                 deletions=self._next_deletions(deletions),
                 viewers=viewers if is_due else None,
@@ -125,43 +125,43 @@ class SiteMessageBuilder:
             None if arrived is None else max(0, pulse - arrived) / self._fps,
         )
 
-    def _next_looks(self, found: Iterable[PersonHere]) -> list[Looks]:
-        """Return looks that are new, or of people who have left since they were sent, and some others."""
+    def _next_histograms(self, found: Iterable[PersonHere]) -> list[PersonHistogram]:
+        """Return histograms that are new, or of people who have left since theirs was sent, and some more."""
         new: list[PersonHere] = []
         old: list[PersonHere] = []
         for person in found:
             sent = self._sent.get(person.number)
             if sent is None:
                 continue
-            has_left = sent.looks_visible and not person.is_visible
-            is_due = person.is_visible and self._count >= sent.looks_at + _LOOKS_EVERY
-            (new if sent.looks_at < 0 or has_left or is_due else old).append(person)
+            has_left = sent.histogram_visible and not person.is_visible
+            is_due = person.is_visible and self._count >= sent.histogram_at + _HISTOGRAM_EVERY
+            (new if sent.histogram_at < 0 or has_left or is_due else old).append(person)
 
         def age(person: PersonHere) -> int:
-            return self._sent[person.number].looks_at
+            return self._sent[person.number].histogram_at
 
-        chosen = [*sorted(new, key=age)[: 2 * LOOKS_MAX], *sorted(old, key=age)[:_REPEATED]]
-        known = self._here.looks(chosen)
-        looks: list[Looks] = []
+        chosen = [*sorted(new, key=age)[: 2 * HISTOGRAMS_MAX], *sorted(old, key=age)[:_REPEATED]]
+        known = self._here.histograms(chosen)
+        histograms: list[PersonHistogram] = []
         size = 0
         for person in chosen:
             histogram, sent = known.get(person.number), self._sent[person.number]
             if histogram is None:
                 continue
-            is_better = histogram.frame_count >= _LOOKS_GROWTH * sent.frames or not person.is_visible
+            is_better = histogram.frame_count >= _HISTOGRAM_GROWTH * sent.frames or not person.is_visible
             if not is_better and person in new:
                 continue
-            looks.append(_pack(person.number, histogram))
-            size += len(looks[-1].histogram)
-            sent.frames, sent.looks_at, sent.looks_visible = (
+            histograms.append(_pack(person.number, histogram))
+            size += len(histograms[-1].histogram)
+            sent.frames, sent.histogram_at, sent.histogram_visible = (
                 histogram.frame_count,
                 self._count,
                 person.is_visible,
             )
             self._bins = histogram.histogram_sum.size
-            if len(looks) == LOOKS_MAX or size > _LOOKS_BYTES:
+            if len(histograms) == HISTOGRAMS_MAX or size > _HISTOGRAM_BYTES:
                 break
-        return looks
+        return histograms
 
     def _next_deletions(self, deletions: Sequence[SiteDeletion]) -> list[SiteDeletion]:
         """Return the newest ones, and the older ones in turn."""
@@ -185,5 +185,7 @@ def _fitting(deletions: Sequence[SiteDeletion]) -> list[SiteDeletion]:
     return fitting
 
 
-def _pack(number: int, histogram: MeanHistogram) -> Looks:
-    return Looks(number=number, frames=histogram.frame_count, histogram=pack_histograms(histogram.mean))
+def _pack(number: int, histogram: MeanHistogram) -> PersonHistogram:
+    return PersonHistogram(
+        number=number, frames=histogram.frame_count, histogram=pack_histograms(histogram.mean)
+    )

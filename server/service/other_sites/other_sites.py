@@ -234,14 +234,14 @@ class OtherSites:
         own = [person.number for person in people if self._people.ids.has(person.number)]
         most = max(SINGLE_CAMERA_NUMBER_MAX, self._people.identity.next_id)
         self._people.identity.reserve_below(min(max(own, default=0) + 1, most))
-        looks = self.elsewhere.looks_of(site, told.looks)
+        histograms = self.elsewhere.histograms_of(site, told.histograms)
         sightings = [
-            person.sighting(looks.pop(person.number, None))
+            person.sighting(histograms.pop(person.number, None))
             for person in people
             if not self._is_contested(site, person)
         ]
         sightings += [
-            self.elsewhere.by_number[number].sighting(histogram) for number, histogram in looks.items()
+            self.elsewhere.by_number[number].sighting(histogram) for number, histogram in histograms.items()
         ]
         populations = {} if site.population is None else {site.name: site.population}
         self._people.identity.add_remote_sightings(sightings, populations)

@@ -15,7 +15,7 @@ from server.config.sections import LinkSettings
 from server.messaging.packed_arrays import unpack_histograms
 from server.messaging.site_people import (
     DIGEST_BYTES,
-    Looks,
+    PersonHistogram,
     SitePeople,
     TokenDigest,
     Viewers,
@@ -53,10 +53,10 @@ class PersonElsewhere:
     stay_s: float | None
     heard_at: float
 
-    def sighting(self, looks: MeanHistogram | None = None) -> RemoteSighting:
+    def sighting(self, histogram: MeanHistogram | None = None) -> RemoteSighting:
         """Return it for the identity registry."""
         is_visible = self.stay_s is not None
-        return RemoteSighting(self.number, self.site, self.camera, self.frame, is_visible, looks)
+        return RemoteSighting(self.number, self.site, self.camera, self.frame, is_visible, histogram)
 
 
 @dataclass(slots=True)
@@ -122,11 +122,13 @@ class PeopleElsewhere:
                 self.by_number[sighting.number] = person
                 yield person
 
-    def looks_of(self, site: LinkedSite, looks: Iterable[Looks]) -> dict[int, MeanHistogram]:
-        """Return the looks in a site's message by number, of those whom it has seen last."""
+    def histograms_of(
+        self, site: LinkedSite, histograms: Iterable[PersonHistogram]
+    ) -> dict[int, MeanHistogram]:
+        """Return the mean histograms in a site's message by number, of those whom it has seen last."""
         return {
             each.number: MeanHistogram.of(unpack_histograms(each.histogram, 1)[0], each.frames)
-            for each in looks
+            for each in histograms
             if each.number in self.by_number and self.by_number[each.number].site == site.name
         }
 

@@ -70,18 +70,18 @@ class PeopleHere:
         """Return the pulse since which a person has been here; None: they are not."""
         return self._arrived.get(number)
 
-    def looks(self, found: Collection[PersonHere]) -> dict[int, MeanHistogram]:
-        """Return these people's looks, by number, as far as they are known."""
-        by_id = self._people.identity.looks([each for person in found for each in person.ids])
-        looks: dict[int, MeanHistogram] = {}
+    def histograms(self, found: Collection[PersonHere]) -> dict[int, MeanHistogram]:
+        """Return these people's mean histograms over the cameras, by number, as far as known."""
+        by_id = self._people.identity.mean_histograms([each for person in found for each in person.ids])
+        histograms: dict[int, MeanHistogram] = {}
         for person in found:
             for each in person.ids:
                 if each not in by_id:
                     continue
-                known, more = looks.get(person.number), by_id[each]
+                known, more = histograms.get(person.number), by_id[each]
                 if known is None or known.histogram_sum.size != more.histogram_sum.size:
-                    looks[person.number] = more
+                    histograms[person.number] = more
                 else:
                     total = known.histogram_sum + more.histogram_sum
-                    looks[person.number] = MeanHistogram(total, known.frame_count + more.frame_count)
-        return looks
+                    histograms[person.number] = MeanHistogram(total, known.frame_count + more.frame_count)
+        return histograms

@@ -7,7 +7,7 @@ import numpy as np
 from bestview import Person
 from bestview.association.appearance.histograms import MeanHistogram, PersonAppearance
 from server.messaging.camera_identity_snapshot import ALIASES_MAX, PERSON_NUMBER_MAX
-from server.messaging.service_record import CameraLooks, PersonState, ServiceRecord, ServiceState
+from server.messaging.service_record import CameraHistogram, PersonState, ServiceRecord, ServiceState
 from server.service.identity.people import PersonTracker
 
 
@@ -30,7 +30,7 @@ def state_of(people: PersonTracker, record: ServiceRecord) -> ServiceState:
                 settled_frames=0 if person is None else person.settled_frames,
                 aliases=[old for old in registry.aliases(number) if old <= PERSON_NUMBER_MAX][-ALIASES_MAX:],
                 name=registry.names.get(number, ""),
-                looks={} if person is None else _looks_of(person),
+                histograms={} if person is None else _histograms_of(person),
             )
         )
     return ServiceState(record=record, people=states)
@@ -40,7 +40,7 @@ def restore_people(people: PersonTracker, state: ServiceState) -> None:
     """Add what another service knows about people, before any of their tracks is reported here."""
     own = [person.number for person in state.people if people.ids.has(person.number)]
     people.identity.reserve_below(max(own, default=0) + 1)
-    people.identity.restore(_person(person) for person in state.people if person.looks)
+    people.identity.restore(_person(person) for person in state.people if person.histograms)
     for person in state.people:
         seen = person.first_seen, person.last_seen
         people.registry.restore(person.number, *seen, departed=person.departed)
@@ -48,24 +48,24 @@ def restore_people(people: PersonTracker, state: ServiceState) -> None:
         people.registry.set_name(person.number, person.name)
 
 
-def _looks_of(person: Person) -> dict[str, CameraLooks]:
+def _histograms_of(person: Person) -> dict[str, CameraHistogram]:
     return {
-        camera: CameraLooks(frames=histogram.frame_count, sums=histogram.histogram_sum.tolist())
+        camera: CameraHistogram(frames=histogram.frame_count, sums=histogram.histogram_sum.tolist())
         for camera, histogram in person.appearance.by_camera.items()
         if histogram.frame_count
     }
 
 
 def _person(state: PersonState) -> Person:
-    looks = {
-        camera: MeanHistogram(np.array(look.sums, dtype=np.float64), look.frames)
-        for camera, look in state.looks.items()
+    histograms = {
+        camera: MeanHistogram(np.array(each.sums, dtype=np.float64), each.frames)
+        for camera, each in state.histograms.items()
     }
     return Person(
         state.number,
         state.last_seen,
         state.camera,
         state.departed,
-        PersonAppearance(looks),
+        PersonAppearance(histograms),
         state.settled_frames,
     )

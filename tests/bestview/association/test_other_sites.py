@@ -62,9 +62,11 @@ class Site:
             if not person.elsewhere and person.last_frame == now
         }
 
-    def tell(self, other: Site, now: int, *, with_looks: bool = True) -> None:
+    def tell(self, other: Site, now: int, *, with_histograms: bool = True) -> None:
         own = [person for person in self.registry.people if not person.elsewhere]
-        looks = self.registry.looks([person.person_id for person in own]) if with_looks else {}
+        histograms = (
+            self.registry.mean_histograms([person.person_id for person in own]) if with_histograms else {}
+        )
         sightings = [
             RemoteSighting(
                 person.person_id,
@@ -72,7 +74,7 @@ class Site:
                 person.camera,
                 person.last_frame,
                 person.last_frame >= now - _UNSEEN,
-                looks.get(person.person_id),
+                histograms.get(person.person_id),
             )
             for person in own
         ]
@@ -84,7 +86,7 @@ def walk_between(
     yard: Sequence[StraightTrack],
     frames: int = 700,
     *,
-    with_looks: bool = True,
+    with_histograms: bool = True,
 ) -> tuple[Site, Site]:
     """Let people walk in two sites that tell each other once a second."""
     sites = Site("hall", 0, hall, frames), Site("yard", 1, yard, frames)
@@ -92,8 +94,8 @@ def walk_between(
         for site, update in zip(sites, pair, strict=True):
             site.updates.append(update)
         if count % _EVERY == 0:
-            sites[0].tell(sites[1], count * STRIDE - 1, with_looks=with_looks)
-            sites[1].tell(sites[0], count * STRIDE - 1, with_looks=with_looks)
+            sites[0].tell(sites[1], count * STRIDE - 1, with_histograms=with_histograms)
+            sites[1].tell(sites[0], count * STRIDE - 1, with_histograms=with_histograms)
         visible = [site.visible(count * STRIDE - 1) for site in sites]
         assert visible[0].isdisjoint(visible[1])
     return sites
@@ -148,7 +150,7 @@ def test_who_returns_still_has_their_number() -> None:
 
 
 def test_a_site_that_does_not_tell_looks_gives_nobody_their_number() -> None:
-    hall, yard = walk_between([stay(0, 1.0, 0, 150)], [stay(0, 1.0, 220, 690)], with_looks=False)
+    hall, yard = walk_between([stay(0, 1.0, 0, 150)], [stay(0, 1.0, 220, 690)], with_histograms=False)
     assert (hall.people["south", 0], yard.people["south", 0]) == (1, 2)
 
 
@@ -176,7 +178,7 @@ def test_travel_times_between_sites_tell_people_with_similar_looks_apart() -> No
     settings = replace(IdentitySettings(), appearance_gate_share=4.0)
     registry = IdentityRegistry(settings, BLIND, ids=IdSeries(1, 2))
     learned = [
-        (100 * n, RemoteSighting(2 * n + 1, "hall", "exit", 100 * n, is_visible=False, looks=None))
+        (100 * n, RemoteSighting(2 * n + 1, "hall", "exit", 100 * n, is_visible=False, histogram=None))
         for n in range(12)
     ]
     arrivals = [stay(n, 1.0 + n / 2, left + 60, left + 90) for n, (left, _) in enumerate(learned)]
@@ -186,12 +188,12 @@ def test_travel_times_between_sites_tell_people_with_similar_looks_apart() -> No
         now = count * STRIDE - 1
         for n, (left, sighting) in enumerate(learned):
             if now == left + 4:
-                registry.add_remote_sightings([replace(sighting, looks=looks_of(1.0 + n / 2))], {})
+                registry.add_remote_sightings([replace(sighting, histogram=histogram_of(1.0 + n / 2))], {})
         if now == late + 4:
             registry.add_remote_sightings(
                 [
-                    RemoteSighting(101, "hall", "exit", late, is_visible=False, looks=looks_of(1.5)),
-                    RemoteSighting(103, "hall", "exit", old, is_visible=False, looks=looks_of(1.6)),
+                    RemoteSighting(101, "hall", "exit", late, is_visible=False, histogram=histogram_of(1.5)),
+                    RemoteSighting(103, "hall", "exit", old, is_visible=False, histogram=histogram_of(1.6)),
                 ],
                 {},
             )
@@ -199,8 +201,8 @@ def test_travel_times_between_sites_tell_people_with_similar_looks_apart() -> No
     assert next(person for person in registry.people if person.person_id == 103).elsewhere
 
 
-def looks_of(which: float) -> MeanHistogram:
-    """Return somebody's looks after a second."""
+def histogram_of(which: float) -> MeanHistogram:
+    """Return somebody's mean histogram after a second."""
     return MeanHistogram.of(coat(which), 25)
 
 
