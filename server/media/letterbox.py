@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from tracking.image_scaling import scale_image
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -18,7 +19,6 @@ class Letterbox:
 
     def __init__(self, camera: tuple[int, int], site: tuple[int, int]) -> None:
         self.camera_size, self.site_size = camera, site
-        self._is_identity = camera == site
         self.scale = min(site[0] / camera[0], site[1] / camera[1])
         self._inner = (
             min(site[0], max(1, round(camera[0] * self.scale))),
@@ -39,14 +39,9 @@ class Letterbox:
 
     def image(self, image: Image) -> Image:
         """Return a camera's image at the site's size."""
-        if self._is_identity and image.shape[1::-1] == self.site_size:
-            return image
-        shrinking = self.scale < 1
-        scaled = cv2.resize(
-            image, self._inner, interpolation=cv2.INTER_AREA if shrinking else cv2.INTER_LINEAR
-        )
+        scaled = scale_image(image, self._inner)
         if self._inner == self.site_size:
-            return np.asarray(scaled, dtype=np.uint8)
+            return scaled
         canvas = np.zeros((self.site_size[1], self.site_size[0], 3), dtype=np.uint8)
         canvas[self._top : self._top + self._inner[1], self._left : self._left + self._inner[0]] = scaled
         return canvas

@@ -12,6 +12,7 @@ from tracking.detectors.base import Image, validate_image
 from tracking.detectors.color_histogram import AppearanceExtractor
 from tracking.detectors.ignore_mask import IgnoreFilter, Polygons
 from tracking.detectors.non_maximum_suppression import non_maximum_suppression
+from tracking.image_scaling import scale_image
 from tracking.types import Detections
 
 # The detector's window is 64x128 pixels, the person in its middle is 96 tall, with 16 above and below.
@@ -87,7 +88,7 @@ class HogDetector:
         height, width = image.shape[:2]
         factor = _PERSON_ROWS / (self.settings.min_height * height)
         size = (max(round(width * factor), 64), max(round(height * factor), 128))
-        scaled = cv2.resize(image, size, interpolation=cv2.INTER_LINEAR)
+        scaled = scale_image(image, size)
         windows, margins = self._hog.detectMultiScale(
             scaled,
             hitThreshold=self.settings.min_margin,

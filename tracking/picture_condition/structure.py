@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from tracking.boxes import Floats
 from tracking.detectors.base import Image, Plane
+from tracking.image_scaling import scale_image
 
 _SIDE = 320
 _CELLS = 16
@@ -83,9 +84,7 @@ def reduce(image: Image) -> Plane:
     """Return an image `(H, W, 3)` gray, at the size that is measured."""
     scale = _SIDE / max(image.shape[:2])
     if scale < 1.0:
-        image = np.asarray(
-            cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA), dtype=np.uint8
-        )
+        image = scale_image(image, (round(image.shape[1] * scale), round(image.shape[0] * scale)))
     return cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).astype(np.float32)
 
 

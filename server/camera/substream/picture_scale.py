@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +11,7 @@ from server.camera.sources.base import Image
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.messaging.messages import Box
+from tracking.image_scaling import scale_image
 
 _USUAL_WIDTH = 640
 """Width in pixels of a substream that has not answered yet."""
@@ -30,9 +30,7 @@ class PictureScale:
 
     def image(self, image: Image) -> Image:
         """Return an image of the site's size at the tracked size."""
-        if self.is_identity:
-            return image
-        return np.asarray(cv2.resize(image, self.tracked, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        return scale_image(image, self.tracked)
 
     def boxes_to_site(self, boxes: NDArray[np.float64]) -> NDArray[np.float64]:
         """Map boxes (N, 4) of the tracked picture to the site's."""
@@ -104,14 +102,7 @@ class SubstreamPlacement:
         if shape is not None:
             inner = Letterbox(shape, (width, height)).content
             left, top, width, height = left + inner[0], top + inner[1], inner[2], inner[3]
-        if image.shape[1::-1] == (width, height):
-            scaled = image
-        else:
-            is_shrinking = width < image.shape[1]
-            interpolation = cv2.INTER_AREA if is_shrinking else cv2.INTER_LINEAR
-            scaled = np.asarray(
-                cv2.resize(image, (width, height), interpolation=interpolation), dtype=np.uint8
-            )
+        scaled = scale_image(image, (width, height))
         if (width, height) == self._tracked:
             return scaled
         canvas = np.zeros((self._tracked[1], self._tracked[0], 3), dtype=np.uint8)

@@ -135,6 +135,20 @@ def test_a_picture_is_relit_at_the_size_of_the_input(
     assert after < before if resize == "stretch" else after == before
 
 
+def test_a_network_sees_the_mean_of_what_is_finer_than_its_pixels(tmp_path: Path) -> None:
+    shown: list[Image] = []
+
+    def keep(image: Image) -> Image:
+        shown.append(image)
+        return image
+
+    network = detector(save_network(tmp_path / "tiny.onnx", V8))
+    noise = np.random.default_rng(1).integers(0, 256, (1080, 1920, 3), dtype=np.uint8)
+    network.find(noise, keep)
+    # Means of 20 by 20 pixels; a few of them would have a deviation of 40.
+    assert shown[0].std() < 6.0
+
+
 @pytest.mark.parametrize("wrong", [np.nan, np.inf])
 def test_rows_that_are_not_finite_are_nobody_and_an_output_without_others_is_refused(wrong: float) -> None:
     output = yolov5([(*MIDDLE, 0.9, 0.8), (*AWAY, 0.9, 0.9)], boxes=2)

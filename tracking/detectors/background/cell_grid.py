@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from tracking.detectors.base import Image, Mask, Plane
 from tracking.detectors.ignore_mask import Polygon, visible_mask
+from tracking.image_scaling import scale_image
 
 
 class CellGrid:
@@ -47,10 +48,7 @@ class CellGrid:
 
     def resize(self, image: Image) -> Image:
         """Return the image at the working size, `(h, w, 3)`."""
-        if image.shape[:2] == self._work:
-            return image
-        size = (self._work[1], self._work[0])
-        return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        return scale_image(image, self.work_size)
 
     def cell_shares(self, mask: Mask) -> Plane:
         """Return the share of the mask in each cell, 0 to 1, padded by the margin."""

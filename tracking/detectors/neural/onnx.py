@@ -17,6 +17,7 @@ from tracking.detectors.neural.providers import Provider
 from tracking.detectors.neural.session import Planes, open_session
 from tracking.detectors.neural.yolo_output import Layout, decode_output
 from tracking.detectors.non_maximum_suppression import non_maximum_suppression
+from tracking.image_scaling import scale_image
 from tracking.types import Detections
 
 # Gray level of the letterbox bars, as in YOLO's training.
@@ -137,7 +138,7 @@ class OnnxDetector:
         scaled_width, scaled_height = round(image.shape[1] * scales[0]), round(image.shape[0] * scales[1])
         left, top = (width - scaled_width) // 2, (height - scaled_height) // 2
         canvas = np.full((height, width, 3), _BAR_LEVEL, dtype=np.uint8)
-        reduced = np.asarray(cv2.resize(image, (scaled_width, scaled_height)), dtype=np.uint8)
+        reduced = scale_image(image, (scaled_width, scaled_height))
         canvas[top : top + scaled_height, left : left + scaled_width] = (
             reduced if relight is None else relight(reduced)
         )
