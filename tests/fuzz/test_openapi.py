@@ -21,6 +21,7 @@ from schemathesis import GenerationMode
 from schemathesis.checks import content_type_conformance, response_schema_conformance, status_code_conformance
 
 from benchmarks.fuzz.http.served_site import ServedSite
+from fakes.setup.onvif_camera import FakeProfile, OnvifCamera, onvif_cameras
 from fakes.timeouts import PATIENCE
 from server.http.access.csrf import CSRF_HEADER
 
@@ -104,6 +105,44 @@ def test_the_answer_while_a_camera_keeps_silent_is_documented(documented_site: S
             base_url=documented_site.url, timeout=PATIENCE, checks=CHECKS, json={"address": address}
         )
     assert (answer.status_code, answer.json().get("ahead")) == (202, 0), answer.text
+
+
+def test_the_answer_while_a_found_camera_is_asked_for_its_streams_is_documented(
+    documented_site: Site, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("onvif", reason="needs onvif-zeep-async: the extra onvif")
+
+    def ask(label: str, **arguments: Any) -> tuple[int, Any]:
+        case = documented_site.operations[label].Case(
+            headers={CSRF_HEADER: "1"}, path_parameters=arguments.pop("path", {})
+        )
+        answer = case.call_and_validate(
+            base_url=documented_site.url, timeout=PATIENCE, checks=CHECKS, **arguments
+        )
+        return answer.status_code, answer.json()
+
+    answers = threading.Event()
+
+    def when_it_answers(body: bytes) -> bytes:
+        assert answers.wait(PATIENCE)
+        return body
+
+    stream = FakeProfile("main", "rtsp://127.0.0.1/live", 64, 48, 12)
+    camera = OnvifCamera("door", [stream], damage=when_it_answers)
+    with onvif_cameras(camera) as targets:
+        monkeypatch.setenv("MYVIEW_DISCOVERY", targets)
+        _, search = ask("POST /api/operator/setup/search")
+        (found,) = search["cameras"]
+        query = {"host": found["host"], "port": found["port"], "user": "viewer", "password": "s3cret"}
+        status, trial = ask("POST /api/operator/setup/streams", json=query)
+        answers.set()
+        assert (status, trial.get("ahead")) == (202, 0), trial
+        answer = 202, trial
+        while answer[0] == 202:
+            answer = ask("GET /api/operator/setup/trials/{key}", path={"key": trial["trial"]})
+    status, offered = answer
+    assert status == 200, offered
+    assert [(each["name"], each["width"]) for each in offered["streams"]] == [("main", 64)]
 
 
 def _has(operation: Any, mode: GenerationMode) -> bool:
