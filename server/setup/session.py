@@ -15,7 +15,7 @@ from server.config.sections import SiteSettings
 from server.setup import discovery
 from server.setup.camera_address import CameraAddress, CameraAddresses, check_name, free_name, parse_address
 from server.setup.discovery import FoundCamera
-from server.setup.own_video import NOT_COMPARED, compare_own_video
+from server.setup.own_video import NOT_COMPARED, OwnVideo, compare_own_video
 from server.setup.proposal import SiteProposal, propose_site
 from server.setup.site_file import NewCamera, NewSite, write_site
 from server.setup.trial_messages import (
@@ -84,10 +84,9 @@ class TriedCamera:
         """The substream in a few words; empty: there is none."""
         return "" if self.substream is None else self.substream.sends
 
-    def as_new(self, name: str, site: SiteProposal | None = None) -> NewCamera:
-        """Return the camera to write, under a name; into a new ``site``, or one that exists."""
+    def as_new(self, name: str, own_video: OwnVideo = NOT_COMPARED) -> NewCamera:
+        """Return the camera to write, under a name."""
         substream = None if self.substream is None else self.substream.address.source
-        own_video = NOT_COMPARED if site is None else compare_own_video(self.trial, site)
         return NewCamera(name, self.address, self.sends, substream, self.tracked_in, own_video)
 
 
@@ -270,7 +269,9 @@ class SetupSession:
         if not self.cameras:
             raise UserError("add a camera first")
         check_section(SiteSettings, {"name": name, **asdict(chosen)}, "site")
-        cameras = [camera.as_new(camera.name, chosen) for camera in self.cameras]
+        cameras = [
+            camera.as_new(camera.name, compare_own_video(camera.trial, chosen)) for camera in self.cameras
+        ]
         self.kept = write_site(NewSite(name, chosen, cameras), self.path)
         self.written.set()
 

@@ -13,13 +13,15 @@ from server.config.loader import load_config, read_content
 from server.setup.camera_address import check_name, free_name
 from server.setup.camera_pixels import CameraPixels, follow_size
 from server.setup.ground import read_ground
+from server.setup.own_video import compare_own_video
+from server.setup.proposal import SiteProposal
 from server.setup.session import TriedCamera
 from server.setup.site_file import (
     camera_entry,
     check_text,
     password_file,
     replace_file,
-    with_stream_comment,
+    with_stream_comments,
     write_passwords,
 )
 from server.setup.site_pixels import Size
@@ -112,7 +114,10 @@ def readdress_camera(
         raise UserError(f"there is no camera {camera_id!a}")
     if any(camera.get("source") == tried.address.source for camera in cameras if camera is not earlier):
         raise UserError(f"{tried.address.shown}: another camera of the configuration has this address")
-    new = tried.as_new(free_name(camera_id, _password_files(path)))
+    config = load_config(path)
+    streams = SiteProposal(config.site.fps, config.site.width, config.site.height)
+    own_video = compare_own_video(tried.trial, streams, config.encode)
+    new = tried.as_new(free_name(camera_id, _password_files(path)), own_video)
     entry = camera_entry(new, path)
     # A substream of another channel, or with the earlier login, would be searched for the wrong people.
     is_same_view = str(earlier.get("source")) == tried.address.source
@@ -122,13 +127,16 @@ def readdress_camera(
     present = CameraPixels(
         {**other, **entry, "id": camera_id}, zones, {} if ground is None else ground.content
     )
-    before = sizes.get(load_config(path).camera(camera_id).source)
+    before = sizes.get(config.camera(camera_id).source)
     changed = follow_size(present, before, (tried.trial.width, tried.trial.height))
     lists: dict[str, Sequence[Mapping[str, Any]]] = {
         "cameras": [changed.entry if camera is earlier else camera for camera in cameras]
     }
     lists |= {"zones": changed.zones} if changed.zones != zones else {}
-    text = with_stream_comment(_checked_text(path, lists), new)
+    has_own_parameters = config.encode.parameters == "own"
+    text = with_stream_comments(
+        _checked_text(path, lists), camera_id, new, has_own_parameters=has_own_parameters
+    )
     write_passwords([new], path)
     if ground is None or changed.ground == ground.content:
         replace_file(text, path)

@@ -17,8 +17,9 @@ from server.config.loader import build_config
 from server.config.site_config import Config
 from server.config.yaml_file import dump_yaml_inline
 from server.setup.camera_address import CameraAddress
-from server.setup.own_video import NOT_COMPARED, OwnVideo
+from server.setup.own_video import NOT_COMPARED, OwnVideo, passthrough_lines, with_passthrough_lines
 from server.setup.proposal import SiteProposal
+from server.setup.yaml_edit import changed_entry_text
 from server.system.atomic_write import atomic_file
 from server.system.errors import UserError, reason_of
 from server.system.private_files import FILE, make_private_folder, write_private
@@ -38,15 +39,13 @@ site:
 
 cameras:
 """
-_PASSED = "    passthrough: auto  # its own video fits, and is sent on as it is: that spares the encoding\n"
-_PASSED_IF = """\
-    #passthrough: auto  # sends its own video on, which spares the encoding, once the camera is set to:
-    # {wanted}
-"""
 _OWN_PARAMETERS = """
 {off}encode:
   {off}parameters: own  # cameras of any make pass through; where Apple's players fail, encode all: equal
 """
+_TRACKED = "people are tracked in it"
+_SENDS = r"\S+ \d+x\d+(?:, \S+ fps)?"
+"""What a stream sends, in the words of set-up."""
 _FILE_LINE = "    password: {file}  # replaces {{password}}; only you can read this file\n"
 
 
@@ -139,23 +138,31 @@ def _camera_text(camera: NewCamera, path: Path) -> str:
     lines += f"  # {camera.sends}\n" if camera.sends else "\n"
     if camera.substream is not None:
         tracked = f", {camera.substream_sends}" if camera.substream_sends else ""
-        lines += f"    substream: {_scalar(camera.substream)}  # people are tracked in it{tracked}\n"
+        lines += f"    substream: {_scalar(camera.substream)}  # {_TRACKED}{tracked}\n"
     if address.password is not None:
         lines += _FILE_LINE.format(file=_scalar(str(password_file(path, camera.id))))
     if address.options:
         lines += f"    options: {dump_yaml_inline(address.options)}\n"
-    if camera.own_video.fits:
-        lines += _PASSED
-    elif camera.own_video.wanted:
-        lines += _PASSED_IF.format(wanted=camera.own_video.wanted)
-    return lines
+    return lines + passthrough_lines(camera.own_video, is_set=camera.own_video.fits)
 
 
-def with_stream_comment(text: str, camera: NewCamera) -> str:
-    """Return a text in which set-up's comment beside a camera's source, if any, says what it sends now."""
-    source = re.escape(_scalar(camera.address.source))
-    written = rf"(?m)^(.*\bsource: {source} +# )\S+ \d+x\d+(, \S+ fps)?$"
-    return re.sub(written, lambda match: f"{match[1]}{camera.sends}", text)
+def with_stream_comments(text: str, camera_id: str, new: NewCamera, *, has_own_parameters: bool) -> str:
+    """Return a text in which what set-up has written about the streams of a camera is true of new ones.
+
+    Other comments stay. ``has_own_parameters``: whether each camera may have parameter sets of its own.
+    """
+
+    def change(lines: str) -> str:
+        lines = re.sub(rf"(?m)^(.*\bsource: .* # ){_SENDS}$", lambda match: f"{match[1]}{new.sends}", lines)
+        if new.substream is not None and new.substream_sends:
+            lines = re.sub(
+                rf"(?m)^( *substream: .* # {_TRACKED}, ){_SENDS}$",
+                lambda match: f"{match[1]}{new.substream_sends}",
+                lines,
+            )
+        return with_passthrough_lines(lines, new.own_video, has_own_parameters=has_own_parameters)
+
+    return changed_entry_text(text, "cameras", camera_id, change)
 
 
 def _scalar(text: str) -> str:

@@ -11,6 +11,8 @@ from types import MappingProxyType
 
 from server.config.loader import check_section, load_config, read_content
 from server.config.sections import SiteSettings
+from server.setup.own_video import unknown_own_video, with_passthrough_lines
+from server.setup.proposal import SiteProposal
 from server.setup.site_file import check_text, replace_file
 from server.setup.site_pixels import Size, moved_settings
 from server.setup.yaml_edit import changed_values_text
@@ -82,5 +84,9 @@ def save_choice(
     size = choice.width, choice.height
     moved = moved_settings(config, content, size, pictures) if size != config.site.size else {}
     text = changed_values_text(path, {"site": changed, **moved})
+    if changed.keys() != {"name"}:
+        streams = SiteProposal(choice.fps, choice.width, choice.height)
+        own_video = unknown_own_video(streams, config.encode)
+        text = with_passthrough_lines(text, own_video, has_own_parameters=config.encode.parameters == "own")
     check_text(text, path)
     replace_file(text, path)

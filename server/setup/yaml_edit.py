@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -45,8 +45,26 @@ def changed_lists_text(path: Path, lists: Mapping[str, Sequence[Mapping[str, Any
     text = path.read_text(encoding="utf-8")
     for section, entries in lists.items():
         if entries != (content.get(section) or []):
-            text = _replaced(text, section, _list_text(text, section, content.get(section) or [], entries))
+            text = _with_entries(text, section, content.get(section) or [], entries)
     return _checked(text, {**content, **{section: list(entries) for section, entries in lists.items()}})
+
+
+def changed_entry_text(text: str, section: str, name: str, change: Callable[[str], str]) -> str:
+    """Return a text in which a function has changed the comments in one entry, with an id, of a list.
+
+    An entry in flow style, or whose content would change, stays as it is.
+    """
+    content = yaml.safe_load(text)
+    lines = text.splitlines(keepends=True)
+    span = _list_span(lines, section) or range(0)
+    begin = span.start
+    for each in _entry_texts(text, section, lines, span, content.get(section) or []):
+        begin = text.index(each.above + each.lines, begin)
+        if each.content.get("id") == name:
+            begin += len(each.above)
+            changed = f"{text[:begin]}{change(each.lines)}{text[begin + len(each.lines) :]}"
+            return changed if yaml.safe_load(changed) == content else text
+    return text
 
 
 def changed_values_text(path: Path, sections: Mapping[str, Mapping[str, Any]]) -> str:
@@ -164,14 +182,50 @@ class _EntryText:
     content: Mapping[str, Any]
 
 
-def _list_text(
+def _with_entries(
     text: str, section: str, old: Sequence[Mapping[str, Any]], entries: Sequence[Mapping[str, Any]]
+) -> str:
+    """Return a text with new entries of a list."""
+    lines = text.splitlines(keepends=True)
+    span = _list_span(lines, section)
+    if not span:
+        return _replaced(text, section, _list_text(text, section, range(0), old, entries))
+    new = _list_text(text, section, span, old, entries)
+    return "".join([*lines[: span.start], new, *lines[span.stop :]])
+
+
+def _list_span(lines: Sequence[str], section: str) -> range | None:
+    """Return the lines of a list, as :func:`_span`, with the comments that end its last entry."""
+    span = _span(lines, section)
+    if not span:
+        return span
+    dash = next((_column(line) for line in lines[span.start :] if line.lstrip(" ").startswith("-")), None)
+    stop = span.stop
+    while dash is not None and stop < len(lines) and _is_comment_inside(lines[stop], dash):
+        stop += 1
+    return range(span.start, stop)
+
+
+def _column(line: str) -> int:
+    return len(line) - len(line.lstrip(" "))
+
+
+def _is_comment_inside(line: str, dash: int) -> bool:
+    """Return whether a line is a comment that is indented as what an entry, with its dash there, contains."""
+    return line.lstrip(" ").startswith("#") and _column(line) > dash
+
+
+def _list_text(
+    text: str,
+    section: str,
+    span: range,
+    old: Sequence[Mapping[str, Any]],
+    entries: Sequence[Mapping[str, Any]],
 ) -> str:
     """Return the lines of a section with new entries."""
     if not entries:
         return f"{section}: []\n"
     lines = text.splitlines(keepends=True)
-    span = _span(lines, section) or range(0)
     known = _entry_texts(text, section, lines, span, old)
     names = {entry.get("id") for entry in entries}
     written = {each.content.get("id"): each for each in known}
@@ -179,7 +233,7 @@ def _list_text(
         each for each in known if each.content.get("id") not in names
     ]  # a renamed one keeps its comments
     first = known[0].lines if known else "  -"
-    indent = first[: len(first) - len(first.lstrip(" "))]
+    indent = " " * _column(first)
     head = lines[span.start] if known else f"{section}:\n"
     parts = [head]
     for entry in entries:
@@ -220,7 +274,9 @@ def _with_pairs(found: _EntryText, node: yaml.MappingNode, wanted: Mapping[str, 
     new = (
         f"{indent}{name}: {dump_yaml_inline(value)}\n" for name, value in wanted.items() if name not in pairs
     )
-    return text + "".join(new)
+    lines = text.splitlines(keepends=True)
+    end = max(number for number, line in enumerate(lines) if _is_content(line)) + 1
+    return "".join([*lines[:end], *new, *lines[end:]])
 
 
 def _with_node(text: str, node: yaml.Node, value: Any) -> str:
@@ -248,10 +304,12 @@ def _entry_texts(
     if not isinstance(node, yaml.SequenceNode) or node.flow_style or len(node.value) != len(old):
         return []
     starts = [item.start_mark.line for item in node.value]
-    begins = []
+    begins = list[int]()
     for start in starts:
         begin = start
         while begin - 1 > span.start and not _is_content(lines[begin - 1]):
+            if begins and _is_comment_inside(lines[begin - 1], _column(lines[start])):
+                break  # it belongs to the entry before
             begin -= 1
         begins.append(begin)
     ends = [*begins[1:], span.stop]
