@@ -154,11 +154,11 @@ class DividedService:
             ids=config.person_numbers,
         )
         self._area = area_to_take_in(config, grounds)
-        of_cameras = StateReplication(
+        state_replication = StateReplication(
             self.people, self.cameras, FPS, lambda _camera, _payload: None, clock=lambda: 0.0
         )
         self._replication = ServiceReplication(
-            config, self.people, of_cameras, exchange.end(index), clock=lambda: 0.0
+            config, self.people, state_replication, exchange.end(index), clock=lambda: 0.0
         )
         exchange.receivers[index] = self._replication.receive
         self.seconds = 0.0

@@ -94,10 +94,10 @@ class OtherSitesMessages(ScriptTarget):
             config.view.identity, CAMERAS, dict.fromkeys(CAMERAS), (WIDTH, HEIGHT), 0, ids=config.sites.ids
         )
         bus, pulses = BusConnection(config), PulseFollower(config)
-        of_cameras = StateReplication(people, CAMERAS, FPS, lambda _, __: None)
-        replication = ServiceReplication(config, people, of_cameras, bus)
+        state_replication = StateReplication(people, CAMERAS, FPS, lambda _, __: None)
+        replication = ServiceReplication(config, people, state_replication, bus)
         sites = OtherSites(
-            config, people, of_cameras, replication, bus, pulses, clock=partial(next, count(0.0))
+            config, people, state_replication, replication, bus, pulses, clock=partial(next, count(0.0))
         )
         for epoch, (name, payload) in enumerate(script):
             self.messages += 1

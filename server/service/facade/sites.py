@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from server.service.other_sites.other_sites import Tokens
+from server.service.other_sites.people_publisher import Tokens
 from server.service.pipeline import BestViewPipeline
 
 
@@ -67,7 +67,7 @@ class SitesService:
 
     def accept_tokens(self, tokens: Callable[[], Tokens | None]) -> None:
         """Set who may know who is here: whose tokens, by SHA-256, are returned; None: everybody."""
-        self._sites.accepted_tokens = tokens
+        self._sites.publisher.accepted_tokens = tokens
 
     def links(self) -> list[SiteLink]:
         """Return the links with all other sites."""

@@ -17,7 +17,7 @@ class SiteDeletions:
     """Translates between this site's deletions and those that sites tell each other.
 
     This site's are of all numbers of one of its numberings, whoever has assigned them; between sites, numbers
-    are told by the site that has assigned them, and since when its numbers are.
+    go with the site that has assigned them, and since when its numbers are.
     """
 
     def __init__(self, ids: IdSeries, ledger: NumberingLedger) -> None:
@@ -25,22 +25,22 @@ class SiteDeletions:
         self._known: list[DeletedPerson] = []
 
     def add(self, deletion: DeletedPerson) -> None:
-        """Add a deletion to what other sites are told."""
+        """Add a deletion of this site, to be published."""
         if deletion not in self._known:
             self._known = [*self._known, deletion][-_KEPT:]
 
-    def told(self, forgotten: Iterable[int], own_since: float) -> list[SiteDeletion]:
-        """Return what to tell other sites; ``forgotten`` are numbers whose deletion only cameras remember."""
+    def to_publish(self, forgotten: Iterable[int], own_since: float) -> list[SiteDeletion]:
+        """Return what to publish; ``forgotten``: numbers whose deletion only cameras remember."""
         known = {number for each in self._known if each.numbers_since == own_since for number in each.numbers}
         rest = [number for number in forgotten if number not in known]
-        told = [
+        of_cameras = [
             each
             for number in rest
             for each in self._split(
                 DeletedPerson(numbers=[number], numbers_since=own_since, deletes_media=False)
             )
         ]
-        return [*told, *(each for deletion in self._known for each in self._split(deletion))]
+        return [*of_cameras, *(each for deletion in self._known for each in self._split(deletion))]
 
     def _split(self, deletion: DeletedPerson) -> Iterable[SiteDeletion]:
         by_index: dict[int, list[int]] = {}
@@ -56,20 +56,20 @@ class SiteDeletions:
                     deletes_media=deletion.deletes_media,
                 )
 
-    def own(
-        self, told: SiteDeletion, with_merged: Callable[[list[int], float], list[int]]
+    def to_own(
+        self, received: SiteDeletion, with_merged: Callable[[list[int], float], list[int]]
     ) -> Iterable[DeletedPerson]:
-        """Return what a deletion at another site means here.
+        """Return the deletions of this site that follow from one at another site.
 
         ``with_merged`` adds to numbers those that are now one person with them, in a numbering of this site.
         """
-        index, since = told.index, told.numbered_since
-        if any((number - 1) % self._ids.step != index for number in told.numbers):
+        index, since = received.index, received.numbered_since
+        if any((number - 1) % self._ids.step != index for number in received.numbers):
             return
         numberings = [since] if index == self._ids.index else self._ledger.own_numberings(index, since)
         for own_since in numberings:
             yield DeletedPerson(
-                numbers=with_merged(told.numbers, own_since),
+                numbers=with_merged(received.numbers, own_since),
                 numbers_since=own_since,
-                deletes_media=told.deletes_media,
+                deletes_media=received.deletes_media,
             )

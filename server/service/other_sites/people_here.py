@@ -1,4 +1,4 @@
-"""The people whom this site sees or has seen last, as other sites are told about them."""
+"""The people whom this site sees or has seen last, as is published to other sites."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ class ServiceReplication:
         self,
         config: Config,
         people: PersonTracker,
-        of_cameras: StateReplication,
+        state_replication: StateReplication,
         bus: BusConnection,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -91,7 +91,7 @@ class ServiceReplication:
             1 if share.areas else max(1, round(_INTERVAL_S * config.site.fps / config.window.stride))
         )
         """Epochs between two records; those whose number it divides have one, in every service."""
-        self._people, self._of_cameras, self._bus, self._clock = people, of_cameras, bus, clock
+        self._people, self._state_replication, self._bus, self._clock = people, state_replication, bus, clock
         self._received: dict[int, _Received] = {}
         self._own: dict[int, ServiceRecord] = {}
         """By pulse."""
@@ -147,10 +147,10 @@ class ServiceReplication:
     def restore(self, state: ServiceState) -> None:
         """Take over a state, before the first epoch."""
         since = max((snapshot.numbered_since for snapshot in state.record.cameras.values()), default=0.0)
-        gone = self._of_cameras.deleted(since)
+        gone = self._state_replication.deleted(since)
         kept = [person for person in state.people if gone.isdisjoint([person.number, *person.aliases])]
         restore_people(self._people, msgspec.structs.replace(state, people=kept))
-        self._of_cameras.take_over(state.record.cameras)
+        self._state_replication.take_over(state.record.cameras)
         text = "took over the state of best-view service %d: %d people"
         log.info(text, state.record.service, len(state.people))
 
@@ -222,7 +222,7 @@ class ServiceReplication:
             self._reserve(own, record)
             if record is leader:
                 self._follow_numbering(record)
-                gone = set(self._of_cameras.forgotten)
+                gone = set(self._state_replication.forgotten)
                 self._follow(
                     find_disagreements(
                         numbers_of_tracks(own.cameras, gone), numbers_of_tracks(record.cameras, gone)
@@ -235,9 +235,9 @@ class ServiceReplication:
         Between areas it is the earliest: none assigns a number that another one remembers.
         """
         since = max((snapshot.numbered_since for snapshot in record.cameras.values()), default=0.0)
-        is_later = since >= self._of_cameras.numbers_since and self._areas.is_other(record)
+        is_later = since >= self._state_replication.numbers_since and self._areas.is_other(record)
         if since > 0.0 and not is_later:
-            self._of_cameras.follow_numbering(since)
+            self._state_replication.follow_numbering(since)
 
     def _follow(self, found: Disagreements) -> None:
         """Follow the leading service where two records in a row differ in the same way."""
@@ -289,8 +289,8 @@ class ServiceReplication:
             self._cameras,
             newest,
             round(RECENT_S * self._fps),
-            self._of_cameras.numbers_since,
-            self._of_cameras.forgotten,
+            self._state_replication.numbers_since,
+            self._state_replication.forgotten,
         )
         return ServiceRecord(
             service=self._index,

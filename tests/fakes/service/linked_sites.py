@@ -58,7 +58,7 @@ class LinkedSites:
             small_config(site={"name": name}, sites=sites, view={"identity": IDENTITY}, **settings)
         )
         service.other_sites._clock = lambda: self.now
-        service.other_sites._bus = _End(self, name)  # type: ignore[assignment]
+        service.other_sites.publisher._bus = _End(self, name)  # type: ignore[assignment]
         service.connect_cameras(*CAMERAS)
         self.running[name] = service
         self._epochs[name] = 500 * index if first is None else first

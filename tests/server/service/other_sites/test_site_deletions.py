@@ -111,7 +111,7 @@ async def test_recordings_of_earlier_runs_lose_the_person_too(tmp_path: Path) ->
         yard.other_sites._ledger.read()
         sites.walk(1, yard={B: LARGE})
         told = SiteDeletion(index=0, numbered_since=7.0, numbers=[1], deletes_media=True)
-        sites.running["hall"].other_sites._deletions.told = lambda *_: [told]  # type: ignore[method-assign]
+        sites.running["hall"].other_sites._deletions.to_publish = lambda *_: [told]  # type: ignore[method-assign]
         sites.walk(2, hall={A: SMALL}, yard={B: LARGE})
         async with asyncio.timeout(PATIENCE):
             await asyncio.gather(*services["yard"].deletion._running)
@@ -171,11 +171,11 @@ def test_numbers_of_a_site_that_was_never_heard_are_not_told() -> None:
     ledger.add(50.0, 1, 9.0)
     deletions = SiteDeletions(IdSeries(0, 3), ledger)
     deletions.add(DeletedPerson(numbers=[1, 2, 3], numbers_since=50.0, deletes_media=True))
-    told = deletions.told([7], 50.0)
+    told = deletions.to_publish([7], 50.0)
     assert [(each.index, each.numbered_since, each.numbers, each.deletes_media) for each in told] == [
         (0, 50.0, [7], False),
         (0, 50.0, [1], True),
         (1, 9.0, [2], True),
     ]
     mixed = SiteDeletion(index=1, numbered_since=9.0, numbers=[2, 3], deletes_media=True)
-    assert list(deletions.own(mixed, lambda numbers, _: numbers)) == []
+    assert list(deletions.to_own(mixed, lambda numbers, _: numbers)) == []
