@@ -28,7 +28,7 @@ from server.config.site_config import Config
 from server.messaging.inbox import Message
 from server.messaging.messages import CameraTracks, ZenohKeys
 from server.service.bus_connection import BusConnection
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.identity.service_area import area_to_take_in
 from server.service.identity.sharding import create_sharding
 from server.service.identity.state_replication import StateReplication

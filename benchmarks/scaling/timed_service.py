@@ -22,7 +22,7 @@ from server.cli.main import main as command_line
 from server.http.api.events import Events
 from server.messaging.bus import Bus
 from server.service.decision_state import DecisionState
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.ingest.epoch_aligner import EpochAligner
 from server.service.ingest.ingest import Ingest
 from server.service.pipeline import BestViewPipeline

@@ -17,7 +17,7 @@ from server.messaging.messages import AppearanceHistogram, CameraTracks, TrackMe
 from server.messaging.packed_arrays import pack_boxes, pack_histograms
 from server.service.decision_state import DecisionState
 from server.service.identity.camera_window import WindowReader
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.view_selection import decider as decider_module
 from server.service.view_selection.decider import ViewDecider

@@ -28,7 +28,7 @@ from server.messaging.site_people import (
     pack_sightings,
 )
 from server.service.bus_connection import BusConnection
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.identity.state_replication import StateReplication
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.other_sites.other_sites import OtherSites

@@ -13,7 +13,7 @@ from server.messaging.camera_identity_snapshot import CameraIdentitySnapshot, Pe
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import DECODE_ERRORS
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.identity.state_replication import StateReplication
 from server.service.ingest.epoch_aligner import Epoch
 

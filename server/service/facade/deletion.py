@@ -14,7 +14,7 @@ import msgspec
 from server.config.tokens_file import read_tokens
 from server.messaging.service_record import DeletedPerson
 from server.service.deletion.journal import Deletion
-from server.service.deletion.memory import forget_people
+from server.service.deletion.memory_removal import forget_people
 from server.service.deletion.recorded_traces import RecordedTraces
 from server.service.facade.deletion_plan import PersonDeletion, camera_losses, other_losses, rounded
 from server.service.facade.errors import BusyError, ConflictError, InvalidCommandError, UnknownObjectError

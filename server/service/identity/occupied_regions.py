@@ -17,7 +17,7 @@ from bestview import TrackKey
 from server.messaging.messages import NumberedBox
 from server.messaging.packed_arrays import unpack_boxes, unpack_detections
 from server.service.identity.camera_window import CameraWindow
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.identity.track_parts import UNCONFIRMED
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.ingest.window_history import HistorySpan

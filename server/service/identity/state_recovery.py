@@ -16,7 +16,7 @@ from server.messaging.camera_identity_snapshot import (
     PersonSnapshot,
 )
 from server.service.identity.local_numbers import TrackName
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 
 SINGLE_CAMERA_NUMBER_MAX = 1_000_000
 """The largest first free number that is accepted from a single camera; another must confirm larger ones."""

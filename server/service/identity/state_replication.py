@@ -13,7 +13,7 @@ from bestview import IdSeries
 from server.messaging.camera_identity_snapshot import SNAPSHOT_BYTES_MAX, CameraIdentitySnapshot
 from server.messaging.inbox import Message
 from server.messaging.messages import camera_of_key
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.identity.state_recovery import (
     MAX_DOWNTIME_S,
     RECENT_S,

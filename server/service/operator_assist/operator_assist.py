@@ -9,7 +9,7 @@ import msgspec
 
 from server.config.site_config import Config
 from server.messaging.operator_messages import CorrectedPosition, PositionCorrections
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.operator_assist.flags import FlagQueue, PersonRisk
 

@@ -22,7 +22,7 @@ from server.messaging.site_people import (
     pack_population,
     pack_sightings,
 )
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.other_sites.people_here import PeopleHere, PersonHere
 
 _HISTOGRAM_BYTES = 1 << 14

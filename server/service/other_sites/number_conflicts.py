@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 
 from server.config.site_config import Config
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.other_sites.people_elsewhere import LinkedSite, PersonElsewhere
 from server.service.other_sites.people_here import PeopleHere
 

@@ -26,7 +26,7 @@ from server.messaging.inbox import Message
 from server.messaging.messages import DECODE_ERRORS
 from server.messaging.site_people import MESSAGE_BYTES_MAX, VERSION, SitePeople
 from server.service.bus_connection import BusConnection
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.identity.state_recovery import SINGLE_CAMERA_NUMBER_MAX
 from server.service.identity.state_replication import StateReplication
 from server.service.other_sites.deletions import SiteDeletions

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from bestview.association.appearance.histograms import MeanHistogram
 from server.messaging.camera_identity_snapshot import PERSON_NUMBER_MAX
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from tracking.frame_rate import frames_in
 
 VISIBLE_S = 1.0

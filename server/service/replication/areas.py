@@ -12,7 +12,7 @@ from server.config.sections import ShareSettings
 from server.messaging.camera_identity_snapshot import PERSON_NUMBER_MAX
 from server.messaging.service_record import ServiceRecord, Stay
 from server.service.identity.local_numbers import TrackName
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.identity.sharding import OtherArea, ShardingByArea
 from server.service.identity.track_parts import UNCONFIRMED
 from server.service.replication.disagreements import (

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from server.messaging.camera_identity_snapshot import CameraIdentitySnapshot
 from server.service.identity.local_numbers import TrackName
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 
 Snapshots = Mapping[str, CameraIdentitySnapshot]
 """By camera."""

@@ -30,7 +30,7 @@ from server.messaging.service_record import (
     ServiceState,
 )
 from server.service.bus_connection import BusConnection
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.identity.state_recovery import RECENT_S, state_for_cameras
 from server.service.identity.state_replication import StateReplication
 from server.service.ingest.epoch_aligner import Epoch

@@ -8,7 +8,7 @@ from bestview import Person
 from bestview.association.appearance.histograms import MeanHistogram, PersonAppearance
 from server.messaging.camera_identity_snapshot import ALIASES_MAX, PERSON_NUMBER_MAX
 from server.messaging.service_record import CameraHistogram, PersonState, ServiceRecord, ServiceState
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 
 
 def state_of(people: PersonTracker, record: ServiceRecord) -> ServiceState:

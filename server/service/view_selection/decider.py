@@ -14,7 +14,7 @@ from server.config.sections import LIVE_VIEW_SETTINGS, ViewSettings
 from server.config.site_config import Config
 from server.messaging.messages import NumberedBox
 from server.service.identity.occupied_regions import OccupiedRegions, Regions
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.identity.sharding import create_sharding
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.view_selection.current_shots import CurrentShots

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bestview import NO_VIEW_COST, GopCosts, VisibleViews, add_inferred_views, add_missed_detections
 from bestview.quality import relative_view_quality
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.view_selection.recent_views import RecentViews
 from server.service.view_selection.undetected_view_inference import UndetectedViewInference
 from server.service.view_selection.undetected_views import UndetectedViews

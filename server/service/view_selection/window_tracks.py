@@ -8,7 +8,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.ingest.window_history import HistorySpan
 from server.service.view_selection.view_quality_buffer import WindowQuality
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from bestview import IdentityUpdate
 from fakes.timeouts import PATIENCE
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 
 
 def hold(tracker: PersonTracker) -> threading.Event:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from bestview import IdentitySettings, IdentityUpdate, Merge, Split, TrackletKey, TrackUpdate
 from fakes.service.scripted_cameras import CAMERAS, HEIGHT, WIDTH
 from server.messaging.messages import Box
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 
 
 def people(**settings: int) -> PersonTracker:

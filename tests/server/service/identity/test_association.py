@@ -13,7 +13,7 @@ from fakes.service.held_association import hold, release_when_waited_for
 from fakes.service.scripted_cameras import LARGE, SMALL, STRIDE, camera_tracks, epoch_of
 from fakes.service.scripted_identities import boxes, people
 from fakes.timeouts import PATIENCE
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
 
 EPOCHS = 4

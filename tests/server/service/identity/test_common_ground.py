@@ -8,7 +8,7 @@ from bestview import Merge, Split
 from fakes.service.joint_floor import FPS, SIZE, VIEWS, joint_config, walk_past, walked_epochs
 from fakes.tracking.walked_floor import FloorNoise
 from server.service.identity.local_numbers import TrackName
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.joint_tracking.stage import JointStage
 from server.service.view_selection.decider import camera_homographies

@@ -11,7 +11,7 @@ from bestview import IdentityUpdate, Merge, Split
 from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL, STRIDE, camera_tracks, epoch_of
 from fakes.service.scripted_identities import ScriptedRegistry, boxes, identity_update, people
 from server.service.identity.manual_overrides import ManualOverrides
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 
 numbers = st.integers(1, 6)
 

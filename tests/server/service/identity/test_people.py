@@ -23,7 +23,7 @@ from fakes.service.scripted_cameras import (
 )
 from fakes.service.scripted_identities import ScriptedRegistry, boxes, identity_update, people
 from server.service.identity.local_numbers import LocalNumbers
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.ingest.window_history import WindowHistory
 
 

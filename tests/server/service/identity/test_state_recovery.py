@@ -34,7 +34,7 @@ from server.messaging.camera_identity_snapshot import (
 from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import Box, ZenohKeys
-from server.service.deletion.memory import forget_people
+from server.service.deletion.memory_removal import forget_people
 from server.service.identity.state_recovery import (
     MAX_DOWNTIME_S,
     SINGLE_CAMERA_NUMBER_MAX,

@@ -31,7 +31,7 @@ from server.media.stream_format import StreamFormat
 from server.messaging.inbox import Message
 from server.messaging.messages import ZenohKeys
 from server.messaging.picture_motion import picture_motion
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.ingest.epoch_aligner import EpochAligner
 from server.service.ingest.ingest import Ingest
 from server.service.streaming.frame_buffer import FrameBuffer

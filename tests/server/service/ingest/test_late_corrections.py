@@ -10,7 +10,7 @@ from fakes.service.scripted_cameras import HEIGHT, STRIDE, WIDTH, camera_tracks,
 from server.messaging.epochs import end_of_epoch
 from server.messaging.messages import Box, CameraTracks
 from server.messaging.packed_arrays import first_boxes
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
 
 LEFT: Box = (10.0, 20.0, 40.0, 110.0)

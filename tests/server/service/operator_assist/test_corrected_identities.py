@@ -11,7 +11,7 @@ from bestview import IdentitySettings, Split
 from server.camera.operator_corrections import merge_correction
 from server.camera.track_messages import TrackMessageBuilder
 from server.messaging.messages import CameraTracks
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.operator_assist.operator_assist import MarkedPosition, corrections_for_tracker
 from tracking import CostSettings, Detections, WindowSettings, create_solver

@@ -27,7 +27,7 @@ from server.messaging.epochs import end_of_epoch
 from server.messaging.inbox import Message
 from server.messaging.messages import Box, ZenohKeys
 from server.messaging.service_record import DeletedPerson, ServiceRecord, ServiceState
-from server.service.deletion.memory import forget_people
+from server.service.deletion.memory_removal import forget_people
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.metrics.service_collector import ServiceCollector
 from server.service.replication.service_replication import LEASE_S

@@ -21,7 +21,7 @@ from fakes.service.scripted_cameras import (
 )
 from server.messaging.messages import Box, CameraTracks
 from server.messaging.packed_arrays import pack_boxes
-from server.service.identity.people import PersonTracker
+from server.service.identity.person_tracker import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.view_selection.lookahead_window import LookaheadWindow
 from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
