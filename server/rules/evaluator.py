@@ -50,8 +50,8 @@ class Circumstances:
 
 
 @dataclass(slots=True)
-class _Spell:
-    """Something that lasts, as a crowd does.
+class _LastingEvent:
+    """An event that lasts, as a crowd does, from its first sign on.
 
     Attributes:
         began: whether its beginning has been reported.
@@ -86,7 +86,7 @@ class RuleEvaluator:
         self._zone_states: dict[str | None, AreaPresence | LineCrossings] = {}
         self._zone_states.update(self._areas)
         self._zone_states.update(self._lines)
-        self._spells: dict[tuple[str, tuple[int, ...]], _Spell] = {}
+        self._lasting_events: dict[tuple[str, tuple[int, ...]], _LastingEvent] = {}
         """By rule and the people that it is about: one who stays, two who are close, none for a crowd."""
 
     @property
@@ -99,17 +99,17 @@ class RuleEvaluator:
     @property
     def lasting(self) -> frozenset[str]:
         """The names of rules of which something has begun and not ended."""
-        return frozenset(rule for (rule, _), spell in self._spells.items() if spell.began)
+        return frozenset(rule for (rule, _), event in self._lasting_events.items() if event.began)
 
     def merge(self, kept: int, lost: int) -> None:
         """Two numbers are one person."""
         for each in self._zone_states.values():
             each.merge(kept, lost)
-        spells, self._spells = self._spells, {}
-        for (rule, people), spell in spells.items():
+        earlier, self._lasting_events = self._lasting_events, {}
+        for (rule, people), event in earlier.items():
             now = tuple(sorted({kept if person == lost else person for person in people}))
-            if len(now) == len(people) and not self._spells.get((rule, now), _Spell()).began:
-                self._spells[rule, now] = spell
+            if len(now) == len(people) and not self._lasting_events.get((rule, now), _LastingEvent()).began:
+                self._lasting_events[rule, now] = event
 
     def split(self, kept: int, new: int) -> None:
         """A number stood for two people."""
@@ -120,9 +120,11 @@ class RuleEvaluator:
         """Forget someone, without an event; a crowd lasts without them."""
         for each in self._zone_states.values():
             each.forget(person)
-        self._spells = {key: spell for key, spell in self._spells.items() if person not in key[1]}
-        for spell in self._spells.values():
-            spell.people = tuple(each for each in spell.people if each != person)
+        self._lasting_events = {
+            key: event for key, event in self._lasting_events.items() if person not in key[1]
+        }
+        for event in self._lasting_events.values():
+            event.people = tuple(each for each in event.people if each != person)
 
     def step(self, frame: PeopleOfFrame, circumstances: Circumstances) -> list[RuleEvent]:
         """Process the next frame; return events in the order of the rules."""
@@ -187,18 +189,18 @@ class RuleEvaluator:
             for person, since in inside.items()
             if frame.pulse - since >= rule.longer_than and rule.is_about(person, circumstances.names)
         }
-        yield from self._lasting(rule, frame.pulse, staying, hold=0)
+        yield from self._report_lasting(rule, frame.pulse, staying, hold=0)
 
     def _crowds(
         self, rule: Rule, frame: PeopleOfFrame, circumstances: Circumstances, applies: bool
     ) -> Iterator[RuleEvent]:
         inside = self._areas[rule.zone].inside if applies else {}
         people = tuple(sorted(person for person in inside if rule.is_about(person, circumstances.names)))
-        spell = self._spells.setdefault((rule.name, ()), _Spell())
-        if len(people) > rule.more_than and not spell.began:
-            spell.people = people
+        event = self._lasting_events.setdefault((rule.name, ()), _LastingEvent())
+        if len(people) > rule.more_than and not event.began:
+            event.people = people
         crowd: dict[tuple[int, ...], int] = {(): frame.pulse} if len(people) > rule.more_than else {}
-        yield from self._lasting(rule, frame.pulse, crowd, hold=rule.hold)
+        yield from self._report_lasting(rule, frame.pulse, crowd, hold=rule.hold)
 
     def _pairs(
         self, rule: Rule, frame: PeopleOfFrame, circumstances: Circumstances, applies: bool
@@ -212,30 +214,30 @@ class RuleEvaluator:
             reach = rule.closer_than + rule.margin
             for one, other in np.argwhere(np.triu(distances < reach, 1)).tolist():
                 pair = (people[one], people[other])
-                spell = self._spells.get((rule.name, pair))
-                is_near = distances[one, other] < rule.closer_than or (spell is not None and spell.began)
+                event = self._lasting_events.get((rule.name, pair))
+                is_near = distances[one, other] < rule.closer_than or (event is not None and event.began)
                 if is_near and any(rule.is_about(person, circumstances.names) for person in pair):
                     close[pair] = frame.pulse
-        yield from self._lasting(rule, frame.pulse, close, hold=rule.hold)
+        yield from self._report_lasting(rule, frame.pulse, close, hold=rule.hold)
 
-    def _lasting(
+    def _report_lasting(
         self, rule: Rule, pulse: int, true_of: Mapping[tuple[int, ...], int], *, hold: int
     ) -> Iterator[RuleEvent]:
         """Report beginnings and ends of what is true of some people since a frame, if it lasts for a hold."""
-        known = [people for name, people in self._spells if name == rule.name]
+        known = [people for name, people in self._lasting_events if name == rule.name]
         for people in sorted({*known, *true_of}):
-            spell = self._spells.setdefault((rule.name, people), _Spell())
-            if (people in true_of) == spell.began:
-                spell.changing_since = None
+            event = self._lasting_events.setdefault((rule.name, people), _LastingEvent())
+            if (people in true_of) == event.began:
+                event.changing_since = None
             else:
-                if spell.changing_since is None:
-                    spell.changing_since = true_of.get(people, pulse)
-                if pulse - spell.changing_since >= hold:
-                    spell.began, since, spell.changing_since = not spell.began, spell.changing_since, None
-                    phase = Phase.BEGAN if spell.began else Phase.ENDED
-                    yield _event(rule, phase, since, pulse, people or spell.people)
-            if not spell.began and spell.changing_since is None:
-                del self._spells[rule.name, people]
+                if event.changing_since is None:
+                    event.changing_since = true_of.get(people, pulse)
+                if pulse - event.changing_since >= hold:
+                    event.began, since, event.changing_since = not event.began, event.changing_since, None
+                    phase = Phase.BEGAN if event.began else Phase.ENDED
+                    yield _event(rule, phase, since, pulse, people or event.people)
+            if not event.began and event.changing_since is None:
+                del self._lasting_events[rule.name, people]
 
 
 def _event(

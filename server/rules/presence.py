@@ -45,7 +45,7 @@ class Sighting:
     cameras: frozenset[str]
 
 
-class _Seen(Protocol):
+class _PersonState(Protocol):
     last_seen: int
     cameras: frozenset[str]
     unseen: int
@@ -218,7 +218,7 @@ class LineCrossings:
         return Change(person, side.stepped, side.inward) if crossed else None
 
 
-_State = TypeVar("_State", bound=_Seen)
+_State = TypeVar("_State", bound=_PersonState)
 
 
 def _lost(states: Mapping[int, _State], pulse: int, usable: frozenset[str], absent: int) -> list[int]:

@@ -1,8 +1,8 @@
-"""Finds two people who were taken for each other when they met, by how they look before and after.
+"""Finds two people who were taken for each other when they met, by their appearance before and after.
 
-The program decides who is who within a window, and while people stand together their boxes and looks are
-mixed. Once they have parted, each is seen alone for as long as it takes: then how both look is compared with
-how they looked before they met.
+The program decides who is who within a window, and while people stand together their boxes and histograms are
+mixed. Once they have parted, each is seen alone for as long as it takes: then their appearance is compared
+with that before they met.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _MIN_SIGHTINGS = 3
 _EXCHANGED, _CLEARLY_NOT = -0.12, 0.12
 """Sums of both people's mean evidence up to which they were exchanged, and from which they were not."""
 _MEMORY = 30.0
-"""Sightings that the looks of a person are the mean of."""
+"""Sightings over which a person's appearance is averaged."""
 
 Pair = tuple[int, int]
 """Ids of two people, the lower one first."""
@@ -41,7 +41,7 @@ class ClearSighting:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class PersonInFrame:
     """A person in a frame.
 
     Attributes:
@@ -60,7 +60,7 @@ class _Meeting:
     """Two people who are, or were, near each other.
 
     Attributes:
-        before: by person, the looks before they met.
+        before: by person, the appearance before they met.
         parted_s: seconds since they parted.
         evidence: by person and camera, by how much less each sighting since resembles the other.
     """
@@ -73,8 +73,8 @@ class _Meeting:
         """Begin to compare anew: they are near each other again, or one of them was somebody else."""
         self.parted_s, self.evidence = 0.0, {}
 
-    def compare(self, person: Seen, other: int) -> None:
-        """Compare a person's sightings with the looks of both."""
+    def compare(self, person: PersonInFrame, other: int) -> None:
+        """Compare a person's sightings with the appearance of both."""
         for sighting in person.sightings:
             own, others = (self.before[number].get(sighting.camera) for number in (person.id, other))
             if own is None or others is None or not len(own) == len(others) == len(sighting.histogram):
@@ -94,8 +94,8 @@ class _Meeting:
         )
 
 
-class _LooksAlone:
-    """How a person looks by camera, the mean of sightings while nobody else was near."""
+class _SoloAppearance:
+    """A person's appearance by camera: the mean of the sightings while nobody else was near."""
 
     def __init__(self) -> None:
         self._means: dict[int, Floats] = {}
@@ -121,19 +121,19 @@ class ExchangeMonitor:
 
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
-        self._looks: dict[int, _LooksAlone] = {}
+        self._appearances: dict[int, _SoloAppearance] = {}
         self._meetings: dict[Pair, _Meeting] = {}
 
-    def update(self, people: Sequence[Seen], known: Collection[int]) -> list[Pair]:
+    def update(self, people: Sequence[PersonInFrame], known: Collection[int]) -> list[Pair]:
         """Add a frame; return the pairs of ids that have been exchanged, each id in one at most.
 
         From then on, their ids are taken to have been exchanged back. `known`: the ids of everybody who has
         not left, also of those who are hidden in this frame.
         """
         found = {person.id: person for person in people}
-        self._looks = {number: self._looks.get(number, _LooksAlone()) for number in known}
+        self._appearances = {number: self._appearances.get(number, _SoloAppearance()) for number in known}
         self._meetings = {
-            pair: each for pair, each in self._meetings.items() if self._looks.keys() >= set(pair)
+            pair: each for pair, each in self._meetings.items() if self._appearances.keys() >= set(pair)
         }
         near = dict.fromkeys(_near(people))
         exchanged, moved = list[Pair](), set[int]()
@@ -149,17 +149,19 @@ class ExchangeMonitor:
             if pair in self._meetings:
                 self._meetings[pair].resume()
             else:
-                self._meetings[pair] = _Meeting({number: self._looks[number].by_camera() for number in pair})
+                self._meetings[pair] = _Meeting(
+                    {number: self._appearances[number].by_camera() for number in pair}
+                )
         unsure = {number for pair in self._meetings for number in pair}
         for number in found.keys() - unsure:
-            self._looks[number].learn(found[number].sightings)
+            self._appearances[number].learn(found[number].sightings)
         return exchanged
 
     def clear(self) -> None:
         """Forget all."""
-        self._looks, self._meetings = {}, {}
+        self._appearances, self._meetings = {}, {}
 
-    def _were_exchanged(self, pair: Pair, found: Mapping[int, Seen]) -> bool:
+    def _were_exchanged(self, pair: Pair, found: Mapping[int, PersonInFrame]) -> bool:
         """Compare two people who have parted with before; the meeting ends when it is clear."""
         meeting = self._meetings[pair]
         meeting.parted_s += self._seconds
@@ -184,7 +186,7 @@ def clear_sightings(places: Places, k: int) -> list[ClearSighting]:
     ]
 
 
-def _near(people: Sequence[Seen]) -> list[Pair]:
+def _near(people: Sequence[PersonInFrame]) -> list[Pair]:
     """Return the pairs of people who are near each other, the lower id first."""
     ordered = sorted(people, key=lambda person: person.id)
     places = np.array([person.place for person in ordered]).reshape(-1, 2)

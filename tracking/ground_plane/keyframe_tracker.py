@@ -17,7 +17,7 @@ from tracking.boxes import Floats
 from tracking.frame_rate import frames_in
 from tracking.ground_plane.camera import BoxSizes, GroundCamera
 from tracking.ground_plane.candidates import Candidates
-from tracking.ground_plane.exchanges import ExchangeMonitor, Seen, clear_sightings
+from tracking.ground_plane.exchanges import ExchangeMonitor, PersonInFrame, clear_sightings
 from tracking.ground_plane.motion import MotionState
 from tracking.ground_plane.motion_scale import MotionScale
 from tracking.ground_plane.person import GroundPerson
@@ -241,7 +241,9 @@ class KeyframeTracker:
 
     def _exchange(self, places: Places, found: Sequence[_Located]) -> dict[int, int]:
         """Exchange the ids of people who were taken for each other; return the former id by id."""
-        seen = [Seen(each.person.id, each.place, clear_sightings(places, each.state)) for each in found]
+        seen = [
+            PersonInFrame(each.person.id, each.place, clear_sightings(places, each.state)) for each in found
+        ]
         people = {each.person.id: each.person for each in found}
         former: dict[int, int] = {}
         for one, two in self._exchanges.update(seen, [person.id for person in self._people]):

@@ -19,7 +19,7 @@ _MEGA = 1e6
 
 @dataclass(frozen=True, slots=True)
 class ServiceRates:
-    """ServiceRates between two snapshots; None with only one, or after a restart of the service."""
+    """Rates of the service between two snapshots; None with only one, or after a restart of the service."""
 
     cores: float | None = None
     bytes_s: float | None = None

@@ -16,7 +16,7 @@ from tracking.ground_plane import (
     track_ground_plane,
 )
 from tracking.ground_plane.between_keyframes import Keyframe, frames_until
-from tracking.ground_plane.exchanges import ClearSighting, ExchangeMonitor, Seen
+from tracking.ground_plane.exchanges import ClearSighting, ExchangeMonitor, PersonInFrame
 
 VIEWS = floor_views()
 CAMERAS = {name: view.camera for name, view in VIEWS.items()}
@@ -26,8 +26,10 @@ PINK = 0.97 * RED + 0.03 * BLUE
 """Hardly another color than red."""
 
 
-def seen(number: int, place: float, looks: Floats | None, camera: int = 0) -> Seen:
-    return Seen(number, np.array([place, 0.0]), [ClearSighting(camera, looks)] if looks is not None else [])
+def seen(number: int, place: float, looks: Floats | None, camera: int = 0) -> PersonInFrame:
+    return PersonInFrame(
+        number, np.array([place, 0.0]), [ClearSighting(camera, looks)] if looks is not None else []
+    )
 
 
 class Meeting:
