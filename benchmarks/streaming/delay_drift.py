@@ -56,7 +56,7 @@ class PacedCameras:
         self._keys = ZenohKeys(service.config.site.name)
         self._trackers = [SimulatedTracker(hall, camera, _BOOT) for camera in range(CAMERAS)]
         for name in hall.ids:
-            service.ingest.alive(self._keys.camera(name, "alive"), is_present=True)
+            service.ingest.set_present(self._keys.camera(name, "alive"), is_present=True)
 
     def pulse(self, number: int) -> None:
         """Feed the messages of a pulse, and let the service decide."""
@@ -64,14 +64,16 @@ class PacedCameras:
         for name, film in zip(self._hall.ids, self._films, strict=True):
             unit = film[number % len(film)]
             head = FrameHeader(pulse=number, key=unit.key, boot=_BOOT, due=0.0, captured_at=0.0, encoded=0.0)
-            service.ingest.video(self._message(name, "video", unit.data, msgspec.msgpack.encode(head)))
+            service.ingest.receive_video(
+                self._message(name, "video", unit.data, msgspec.msgpack.encode(head))
+            )
         service.pulses.newest = number
         if (number + 1) % STRIDE:
             return
         places = self._hall.places(max(0, number + 1 - WINDOW), number)
         for name, tracker in zip(self._hall.ids, self._trackers, strict=True):
             payload = msgspec.msgpack.encode(tracker.message(number // STRIDE, places))
-            service.ingest.tracks(self._message(name, "tracks", payload, b""))
+            service.ingest.receive_tracks(self._message(name, "tracks", payload, b""))
         service.decide()
 
     def _message(self, camera: str, topic: str, payload: bytes, attachment: bytes) -> Message:

@@ -141,7 +141,7 @@ class BestViewPipeline:
         """
         self.pulses.load_credentials()
         own = {"tracks": self._tracks, "retained_identities": self._retained_identities}
-        on_audio = None if self.audio_buffer is None else self.ingest.audio
+        on_audio = None if self.audio_buffer is None else self.ingest.receive_audio
         self.bus.open({**self.ingest.handlers, **own}, on_audio, self._alive)
 
     async def run(self) -> None:
@@ -284,18 +284,18 @@ class BestViewPipeline:
             closing.callback(self.splicer.close)
 
     def _tracks(self, message: Message) -> None:
-        self.ingest.tracks(message)
+        self.ingest.receive_tracks(message)
         self._changed.set()
 
     def _alive(self, key: str, is_present: bool) -> None:
-        self.ingest.alive(key, is_present)
-        self.state_replication.alive(key, is_present)
+        self.ingest.set_present(key, is_present)
+        self.state_replication.set_present(key, is_present)
         self._changed.set()
         if self.state_replication.is_waiting:
             asyncio.get_running_loop().call_later(SNAPSHOT_WAIT_S, self._changed.set)
 
     def _retained_identities(self, message: Message) -> None:
-        self.ingest.retained_identities(message, self.state_replication.snapshot_received)
+        self.ingest.receive_retained_identities(message, self.state_replication.receive_snapshot)
         self._changed.set()
 
     def _finish_epoch(self, epoch: Epoch, decisions: Sequence[GopDecision]) -> None:

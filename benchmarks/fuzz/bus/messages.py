@@ -92,16 +92,16 @@ class IngestMessages(Target):
         audio_buffer = AudioBuffer(self._form, FPS, 10.0)
         ingest = Ingest(frame_buffers, aligner, lambda *_: None, audio_buffer, audio_sender=CAMERAS[0])
         handlers = {
-            "video": ingest.video,
-            "tracks": ingest.tracks,
-            "status": ingest.status,
-            "thumbs": ingest.thumbnail,
-            "unavailable": ingest.unavailable,
+            "video": ingest.receive_video,
+            "tracks": ingest.receive_tracks,
+            "status": ingest.receive_status,
+            "thumbs": ingest.receive_thumbnail,
+            "unavailable": ingest.receive_unavailable,
         }
         for key, payload, head in _script.decode(data):
             message = Message(key, payload, head)
             if key == KEYS.sound:
-                ingest.audio(message)
+                ingest.receive_audio(message)
             for topic, handle in handlers.items():
                 if f"/{topic}" in key:
                     handle(message)

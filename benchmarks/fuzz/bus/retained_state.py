@@ -67,12 +67,12 @@ class RetainedStates(ScriptTarget):
         )
         replication = StateReplication(people, CAMERAS, FPS, lambda _, payload: published.append(payload))
         for camera in CAMERAS:
-            replication.alive(KEYS.camera(camera, "alive"), is_present=True)
+            replication.set_present(KEYS.camera(camera, "alive"), is_present=True)
         bad = 0
         for key, payload in script:
             self.messages += 1
             try:
-                replication.snapshot_received(Message(key, payload, b""))
+                replication.receive_snapshot(Message(key, payload, b""))
             except DECODE_ERRORS:
                 bad += 1
         rng = Random(seed)

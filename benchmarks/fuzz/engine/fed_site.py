@@ -197,26 +197,26 @@ class FedService(BestViewPipeline):
     def __init__(self, config: Config) -> None:
         super().__init__(config)
         self._handlers: Mapping[str, Callable[[Message], None]] = {
-            "video": self.ingest.video,
-            "tracks": self.ingest.tracks,
-            "status": self.ingest.status,
-            "thumbs": self.ingest.thumbnail,
+            "video": self.ingest.receive_video,
+            "tracks": self.ingest.receive_tracks,
+            "status": self.ingest.receive_status,
+            "thumbs": self.ingest.receive_thumbnail,
         }
         self.connect(*CAMERAS)
 
     def connect(self, *cameras: str) -> None:
         """Mark cameras as present."""
         for camera in cameras:
-            self.ingest.alive(KEYS.camera(camera, "alive"), is_present=True)
+            self.ingest.set_present(KEYS.camera(camera, "alive"), is_present=True)
 
     def handle(self, message: Message) -> None:
         """Dispatch a message by its key, as the bus does."""
         if message.key == KEYS.sound:
-            self.ingest.audio(message)
+            self.ingest.receive_audio(message)
         parts = message.key.split("/")
         topic = parts[4] if len(parts) > 4 else ""
         if topic == "alive":
-            self.ingest.alive(message.key, is_present=message.payload == b"1")
+            self.ingest.set_present(message.key, is_present=message.payload == b"1")
         elif topic in self._handlers:
             self._handlers[topic](message)
 

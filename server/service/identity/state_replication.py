@@ -83,8 +83,8 @@ class StateReplication:
         self._sent: dict[str, CameraIdentitySnapshot] = {}
         self._since = time.time()
 
-    def alive(self, key: str, is_present: bool) -> None:
-        """Record that a camera's liveliness token appeared or disappeared."""
+    def set_present(self, key: str, is_present: bool) -> None:
+        """Record whether a camera is present, by its liveliness token."""
         camera = camera_of_key(key)
         if camera in self._cameras and is_present:
             self._any_camera = True
@@ -94,7 +94,7 @@ class StateReplication:
         else:
             self._present.discard(camera)
 
-    def snapshot_received(self, message: Message) -> None:
+    def receive_snapshot(self, message: Message) -> None:
         """Add a camera's snapshot.
 
         One received after the start is used as well; of a second snapshot only the first free number.

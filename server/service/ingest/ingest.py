@@ -107,14 +107,14 @@ class Ingest:
     def handlers(self) -> dict[str, Callable[[Message], None]]:
         """What receives a camera's messages by topic, but for those that others receive, too."""
         return {
-            "video": self.video,
-            "status": self.status,
-            "unavailable": self.unavailable,
-            "thumbs/*": self.thumbnail,
+            "video": self.receive_video,
+            "status": self.receive_status,
+            "unavailable": self.receive_unavailable,
+            "thumbs/*": self.receive_thumbnail,
         }
 
-    def alive(self, key: str, is_present: bool) -> None:
-        """Record that a camera's liveliness token appeared or disappeared."""
+    def set_present(self, key: str, is_present: bool) -> None:
+        """Record whether a camera is present, by its liveliness token."""
         camera = camera_of_key(key)
         state = self.states.get(camera)
         if state is None:
@@ -134,7 +134,7 @@ class Ingest:
         if self._presence_log_limits[camera].take(time.monotonic()):
             log.info("camera %s %s", camera, "connected" if is_present else "disconnected")
 
-    def video(self, message: Message) -> None:
+    def receive_video(self, message: Message) -> None:
         """Buffer and publish a frame."""
         state, camera = self._state_of(message)
         if state is None:
@@ -159,7 +159,7 @@ class Ingest:
             self._aligner.frame_received(camera, head.boot, head.pulse)
             self._on_frame(camera, frame)
 
-    def audio(self, message: Message) -> None:
+    def receive_audio(self, message: Message) -> None:
         """Buffer some of the site's audio."""
         if self._audio_buffer is None or self._audio_camera is None:
             return
@@ -168,7 +168,7 @@ class Ingest:
         except (*DECODE_ERRORS, ValueError) as error:
             self.states[self._audio_camera].count_bad_message(f"audio: {error}")
 
-    def tracks(self, message: Message) -> None:
+    def receive_tracks(self, message: Message) -> None:
         """Pass a window's tracks to the aligner."""
         state, camera = self._state_of(message)
         if state is None:
@@ -189,7 +189,7 @@ class Ingest:
         if tracks.ended:
             self._on_ended(camera, tracks.boot)
 
-    def retained_identities(self, message: Message, handler: Callable[[Message], None]) -> None:
+    def receive_retained_identities(self, message: Message, handler: Callable[[Message], None]) -> None:
         """Pass the identities that a camera has retained to a handler, which may raise a decode error."""
         state, _ = self._state_of(message)
         if state is None:
@@ -199,7 +199,7 @@ class Ingest:
         except DECODE_ERRORS as error:
             state.count_bad_message(error)
 
-    def status(self, message: Message) -> None:
+    def receive_status(self, message: Message) -> None:
         """Record a camera's status."""
         state, _ = self._state_of(message)
         if state is None:
@@ -221,7 +221,7 @@ class Ingest:
             elif status.condition == "clear" and status.covered_share and not was_covered:
                 state.metrics.record_problem(picture_text("clear", status.covered_share))
 
-    def unavailable(self, message: Message) -> None:
+    def receive_unavailable(self, message: Message) -> None:
         """Record why a camera that is not connected cannot use its source, and when it opens it again."""
         state, _ = self._state_of(message)
         if state is None:
@@ -239,7 +239,7 @@ class Ingest:
             state.metrics.record_problem(told.reason)
             state.stream_changes += told.cause == "changed"
 
-    def thumbnail(self, message: Message) -> None:
+    def receive_thumbnail(self, message: Message) -> None:
         """Keep the newest thumbnail of a track."""
         state, camera = self._state_of(message)
         if state is None:

@@ -25,7 +25,7 @@ def decide_gops(served: ServedSite, gops: range, choices: dict[int, str | None] 
         camera = CAMERAS[gop % 2] if choices is None else choices[gop]
         for seed, source in enumerate(CAMERAS if camera is not None else ()):
             for unit in encoded(seed, FRAMES)[gop * GOP : (gop + 1) * GOP]:
-                service.ingest.video(video(source, unit))
+                service.ingest.receive_video(video(source, unit))
         shown = {} if camera is None else {1: camera}
         service.recorder.put(
             GopChoices(first=gop * GOP, frames=GOP, choices=shown, boxes={}, cuts=[]), PULSE0

@@ -95,7 +95,7 @@ def send_audio(service: FedService, recording: Path, silent: range = range(0)) -
     sound = RecordedAudioSource(str(recording), service.config.sound, FPS, 0, "stop")
     frames = [*sound.until(0), *sound.until(FRAMES)]
     for message in audio_messages([frame for frame in frames if frame.number not in silent]):
-        service.ingest.audio(message)
+        service.ingest.receive_audio(message)
     return [frame.data for frame in frames]
 
 

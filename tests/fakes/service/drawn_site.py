@@ -92,12 +92,14 @@ class DrawnSite(ServedSite):
                 if camera not in cameras:
                     continue
                 for unit in units(number, FRAMES)[first : first + STRIDE]:
-                    self.service.ingest.video(video(camera, unit))
+                    self.service.ingest.receive_video(video(camera, unit))
                 seen = [
                     TrackMessage(id=person, boxes=pack_boxes(places), confidence=1.0)
                     for person, places in boxes(number, first, STRIDE).items()
                 ]
-                self.service.ingest.tracks(tracks(camera_tracks(camera, epoch, {}, tracks=seen, size=SIZE)))
+                self.service.ingest.receive_tracks(
+                    tracks(camera_tracks(camera, epoch, {}, tracks=seen, size=SIZE))
+                )
             self.service.pulses.newest = end_of_epoch(epoch, STRIDE)
             self.service.decide()
         self.epochs += epochs

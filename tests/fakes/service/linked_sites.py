@@ -75,7 +75,7 @@ class LinkedSites:
                 epoch = self._epochs[name] = self._epochs[name] + 1
                 for camera in CAMERAS:
                     boxes = seen.get(name, {}) if camera == CAMERAS[0] else {}
-                    service.ingest.tracks(tracks(camera_tracks(camera, epoch, boxes)))
+                    service.ingest.receive_tracks(tracks(camera_tracks(camera, epoch, boxes)))
                 service.pulses.newest = end_of_epoch(epoch, STRIDE)
                 service.decide()
             self.now += STRIDE / FPS

@@ -28,9 +28,9 @@ def feed_epoch(served: ServedSite, epoch: int, codec: Codec, *, first_is_larger_
     sizes = (LARGE, SMALL) if first_is_larger_in_first else (SMALL, LARGE)
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed, FRAMES, codec=codec)[epoch * STRIDE : (epoch + 1) * STRIDE]:
-            served.service.ingest.video(video(camera, unit))
+            served.service.ingest.receive_video(video(camera, unit))
         boxes = {1: sizes[seed], 2: sizes[1 - seed]}
-        served.service.ingest.tracks(tracks(camera_tracks(camera, epoch, boxes)))
+        served.service.ingest.receive_tracks(tracks(camera_tracks(camera, epoch, boxes)))
     served.service.pulses.newest = end_of_epoch(epoch, STRIDE)
     served.service.decide()
 

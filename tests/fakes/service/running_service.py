@@ -37,10 +37,10 @@ def send_epoch(service: FedService, epoch: int, *cameras: str, boxes: Mapping[st
             continue
         encoded_epoch = epoch % ENCODED
         for unit in encoded(seed)[encoded_epoch * STRIDE : (encoded_epoch + 1) * STRIDE]:
-            service.ingest.video(
+            service.ingest.receive_video(
                 video(camera, replace(unit, pulse=unit.pulse + (epoch - encoded_epoch) * STRIDE))
             )
-        service.ingest.tracks(tracks(camera_tracks(camera, epoch, {1: boxes[camera]})))
+        service.ingest.receive_tracks(tracks(camera_tracks(camera, epoch, {1: boxes[camera]})))
 
 
 class PulsesOfTest(PulseFollower):

@@ -224,8 +224,8 @@ class FedService(BestViewPipeline):
         """Connect cameras that have no retained identities."""
         for camera in cameras:
             for part in (self.ingest, self.state_replication):
-                part.alive(ZenohKeys("hall").camera(camera, "alive"), is_present=True)
-            self.state_replication.snapshot_received(
+                part.set_present(ZenohKeys("hall").camera(camera, "alive"), is_present=True)
+            self.state_replication.receive_snapshot(
                 Message(ZenohKeys("hall").camera(camera, "retained_identities"), b"", b"")
             )
 
@@ -236,7 +236,7 @@ class FedService(BestViewPipeline):
                 continue
             units = encoded(seed, self.frames, codec=self.config.encode.codec)
             for unit in units[epoch * STRIDE : (epoch + 1) * STRIDE]:
-                self.ingest.video(video(camera, unit))
-            self.ingest.tracks(tracks(camera_tracks(camera, epoch, seen[camera])))
+                self.ingest.receive_video(video(camera, unit))
+            self.ingest.receive_tracks(tracks(camera_tracks(camera, epoch, seen[camera])))
         self.pulses.newest = end_of_epoch(epoch, STRIDE)
         self.decide()

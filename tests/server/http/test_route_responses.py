@@ -224,9 +224,9 @@ async def test_the_page_and_its_files_are_served(served: ServedSite) -> None:
 
 
 async def test_metrics_are_served(site_with_people: ServedSite) -> None:
-    site_with_people.service.ingest.status(status(A, missed=3, shed=2, clock_offset=0.25))
-    site_with_people.service.ingest.tracks(tracks(camera_tracks(A, 3, {}, without_peers=[15, 17])))
-    site_with_people.service.ingest.tracks(tracks(camera_tracks(B, 3, {})))
+    site_with_people.service.ingest.receive_status(status(A, missed=3, shed=2, clock_offset=0.25))
+    site_with_people.service.ingest.receive_tracks(tracks(camera_tracks(A, 3, {}, without_peers=[15, 17])))
+    site_with_people.service.ingest.receive_tracks(tracks(camera_tracks(B, 3, {})))
     site_with_people.service.joint.offsets = {A: 0.12}
     site_with_people.service.decide()
     async with site_with_people.session.get("/metrics") as answer:

@@ -58,7 +58,7 @@ def feed(service: BestViewService, boxes: list[Box], first: int = 0) -> None:
     pipeline: FedService = service.pipeline  # type: ignore[attr-defined]
     for epoch, box in enumerate(boxes, first):
         if epoch == 1:
-            pipeline.ingest.thumbnail(thumbnail(A, 1, b"\xff\xd8 picture", pulse=4))
+            pipeline.ingest.receive_thumbnail(thumbnail(A, 1, b"\xff\xd8 picture", pulse=4))
         pipeline.feed(epoch, {A: {1: box}, B: {}})
 
 

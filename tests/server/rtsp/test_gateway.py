@@ -55,9 +55,9 @@ async def live(served: ServedSite) -> AsyncIterator[None]:
             for seed, camera in enumerate(CAMERAS):
                 for pulse in range(epoch * STRIDE, (epoch + 1) * STRIDE):
                     unit = replace(encoded(seed, PICTURES, codec=codec)[pulse % PICTURES], pulse=pulse)
-                    served.service.ingest.video(video(camera, unit))
+                    served.service.ingest.receive_video(video(camera, unit))
                 size = LARGE if (epoch + seed) % 2 else SMALL
-                served.service.ingest.tracks(tracks(camera_tracks(camera, epoch, {1: size})))
+                served.service.ingest.receive_tracks(tracks(camera_tracks(camera, epoch, {1: size})))
             served.service.pulses.newest = end_of_epoch(epoch, STRIDE)
             served.service.decide()
             await asyncio.sleep(STRIDE / FPS)

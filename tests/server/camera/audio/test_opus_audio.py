@@ -163,7 +163,7 @@ async def served(recording: Path, tmp_path: Path) -> AsyncIterator[ServedSite]:
         served.service.connect_cameras(*CAMERAS)
         for camera in CAMERAS:
             for unit in access_units(recording):
-                served.service.ingest.video(video(camera, unit))
+                served.service.ingest.receive_video(video(camera, unit))
         yield served
 
 

@@ -44,10 +44,12 @@ def printed(now: client.SiteNow, rates: ServiceRates = ServiceRates(), notice: s
 
 async def test_a_sites_status_is_shown(site_with_people: ServedSite) -> None:
     solve = SolverReport(objective=-4.0, bound=-4.0, gap=0.0, integral=True, rounds=1)
-    site_with_people.service.ingest.status(
+    site_with_people.service.ingest.receive_status(
         status(A, fps=24.5, missed=3, shed=2, waiting=7, synchronized=False)
     )
-    site_with_people.service.ingest.tracks(tracks(camera_tracks(A, 2, {}, solve=solve, solved_at=0.25)))
+    site_with_people.service.ingest.receive_tracks(
+        tracks(camera_tracks(A, 2, {}, solve=solve, solved_at=0.25))
+    )
     site_with_people.service.decider.people.registry.names[1] = "Ann"
     now = await client.status(url(site_with_people))
     assert (now.name, now.ready, now.why, now.pulse) == ("hall", True, "2 of 2 cameras", 14)

@@ -111,8 +111,8 @@ async def test_flags_are_limited_to_the_scope(site: ServedSite, monkeypatch: pyt
     ]
     track_message = camera_tracks(A, 3, {1: SMALL, 2: SMALL}, risk_events=risk_events)
     async with site.session.get("/api/events", headers=bearer("family")) as response:
-        site.service.ingest.tracks(tracks(track_message))
-        site.service.ingest.tracks(tracks(camera_tracks(B, 3, {1: LARGE})))
+        site.service.ingest.receive_tracks(tracks(track_message))
+        site.service.ingest.receive_tracks(tracks(camera_tracks(B, 3, {1: LARGE})))
         site.service.decide()
         unscoped = (await get(site, "/api/flags", "desk"))["flags"]
         assert [(flag["objects"], flag["cameras"], flag["state"]) for flag in unscoped] == [

@@ -202,7 +202,7 @@ async def test_a_token_for_a_person_is_void_after_numbers_restarted(
                 pulse=0, boot=1, next_number=9, numbered_since=remembered, people=[]
             )
             key = ZenohKeys("hall").camera("c0", "retained_identities")
-            served.service.state_replication.snapshot_received(
+            served.service.state_replication.receive_snapshot(
                 Message(key, msgspec.msgpack.encode(snapshot), b"")
             )
         while True:  # the file of tokens is looked at now and then

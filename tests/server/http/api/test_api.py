@@ -80,7 +80,7 @@ async def test_all_people_are_listed_with_the_cameras_that_show_and_see_them(
 
 
 async def test_the_cameras_are_listed_with_their_state(site_with_people: ServedSite) -> None:
-    site_with_people.service.ingest.status(status(A, fps=24.5, missed=3, shed=2, load_level=2))
+    site_with_people.service.ingest.receive_status(status(A, fps=24.5, missed=3, shed=2, load_level=2))
     c0, c1 = (await site_with_people.get_json("/api/cameras"))["cameras"]
     assert c0 == {
         "camera": A,
@@ -105,7 +105,7 @@ async def test_the_cameras_are_listed_with_their_state(site_with_people: ServedS
 async def test_the_condition_of_a_cameras_picture_is_listed_and_measured(
     site_with_people: ServedSite,
 ) -> None:
-    site_with_people.service.ingest.status(status(A, condition="frozen", condition_since=12.5))
+    site_with_people.service.ingest.receive_status(status(A, condition="frozen", condition_since=12.5))
     c0, c1 = (await site_with_people.get_json("/api/cameras"))["cameras"]
     assert (c0["condition"], c0["condition_since"], c1["condition"]) == ("frozen", 12.5, "clear")
     assert c0["message"].startswith("the picture is frozen: ")
@@ -118,7 +118,7 @@ async def test_the_condition_of_a_cameras_picture_is_listed_and_measured(
 async def test_the_covered_share_of_a_cameras_picture_is_listed_and_measured(
     site_with_people: ServedSite,
 ) -> None:
-    site_with_people.service.ingest.status(status(A, covered_share=0.35))
+    site_with_people.service.ingest.receive_status(status(A, covered_share=0.35))
     c0, c1 = (await site_with_people.get_json("/api/cameras"))["cameras"]
     assert (c0["covered_share"], c0["condition"], c1["covered_share"]) == (0.35, "clear", 0.0)
     assert c0["message"].startswith("35 % of the picture is covered: ")
@@ -128,7 +128,7 @@ async def test_the_covered_share_of_a_cameras_picture_is_listed_and_measured(
 
 
 async def test_a_refused_camera_is_listed_with_the_reason(site_with_people: ServedSite) -> None:
-    site_with_people.service.ingest.video(video(A, encoded(5, crf=40)[0]))
+    site_with_people.service.ingest.receive_video(video(A, encoded(5, crf=40)[0]))
     c0 = (await site_with_people.get_json("/api/cameras"))["cameras"][0]
     assert c0["state"] == "refused"
     assert "parameter sets differ" in c0["message"]
@@ -182,8 +182,8 @@ async def test_a_choice_is_explained(site_with_people: ServedSite) -> None:
 async def test_a_thumbnail_is_of_the_chosen_camera_and_its_url_changes_with_it(
     site_with_people: ServedSite,
 ) -> None:
-    site_with_people.service.ingest.thumbnail(thumbnail(A, 1, b"\xff\xd8 of c0", pulse=14))
-    site_with_people.service.ingest.thumbnail(thumbnail(B, 1, b"\xff\xd8 of c1", pulse=10))
+    site_with_people.service.ingest.receive_thumbnail(thumbnail(A, 1, b"\xff\xd8 of c0", pulse=14))
+    site_with_people.service.ingest.receive_thumbnail(thumbnail(B, 1, b"\xff\xd8 of c1", pulse=10))
     one = (await site_with_people.get_json("/api/objects"))["objects"][0]
     assert one["thumbnail"].endswith("objects/1/thumb.jpg?v=10")
     async with site_with_people.session.get("/objects/1/thumb.jpg?v=10") as answer:

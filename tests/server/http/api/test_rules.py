@@ -38,7 +38,7 @@ async def site() -> AsyncIterator[ServedSite]:
 def feed(site: ServedSite) -> None:
     for epoch, box in enumerate(EPOCHS):
         if epoch == 1:
-            site.service.ingest.thumbnail(thumbnail(A, 1, b"\xff\xd8 picture", pulse=4))
+            site.service.ingest.receive_thumbnail(thumbnail(A, 1, b"\xff\xd8 picture", pulse=4))
         site.service.feed(epoch, {A: {1: box}, B: {}})
 
 

@@ -44,7 +44,7 @@ def decide_gops(served: ServedSite, gops: range, without_pictures: frozenset[int
     for gop in gops:
         for seed, camera in enumerate(CAMERAS if gop not in without_pictures else ()):
             for unit in encoded(seed, FRAMES)[gop * GOP : (gop + 1) * GOP]:
-                served.service.ingest.video(video(camera, unit))
+                served.service.ingest.receive_video(video(camera, unit))
         choice = ObjectChoice(1, None if gop in without_pictures else CAMERAS[gop % 2], None, departed=False)
         served.service.splicer.publish_decision(GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON))
 
@@ -278,7 +278,7 @@ async def test_short_gops_are_no_parts_but_requests_can_block_for_segments() -> 
         gops = 40
         for camera in CAMERAS:
             for unit in encoded(0, 100, gop=2)[: 2 * gops]:
-                served.service.ingest.video(video(camera, unit))
+                served.service.ingest.receive_video(video(camera, unit))
         choice = ObjectChoice(1, A, None, departed=False)
         decisions = [GopDecision(2 * gop, 2, (choice,), {}, {}, (), NO_REASON) for gop in range(gops)]
         for decision in decisions[: gops // 2]:

@@ -46,13 +46,15 @@ async def test_a_cameras_stages_are_measured_by_its_reported_times(served: Serve
     show_people(served)
     unit = encoded(0)[15]
     head = FrameHeader(pulse=unit.pulse, key=unit.key, boot=1, due=100.0, captured_at=100.03, encoded=100.04)
-    served.service.ingest.video(
+    served.service.ingest.receive_video(
         Message(ZenohKeys("hall").camera(A, "video"), unit.data, msgspec.msgpack.encode(head))
     )
     solve = SolverReport(objective=-4.0, bound=-4.2, gap=0.2, integral=False, rounds=3, limit="work")
     message = camera_tracks(A, 3, {1: SMALL}, solve=solve, detection_s=0.02, solve_s=0.2, solved_at=100.5)
-    served.service.ingest.tracks(tracks(msgspec.structs.replace(message, first=11, last=15, final_to=15)))
-    served.service.ingest.tracks(tracks(message))
+    served.service.ingest.receive_tracks(
+        tracks(msgspec.structs.replace(message, first=11, last=15, final_to=15))
+    )
+    served.service.ingest.receive_tracks(tracks(message))
     metrics = await samples(served)
     assert metrics["myview_stage_seconds_bucket", A, "take", "0.05"] == 16
     assert metrics["myview_stage_seconds_bucket", A, "take", "0.025"] == 15  # test data takes no time
@@ -70,7 +72,7 @@ async def test_a_cameras_stages_are_measured_by_its_reported_times(served: Serve
 async def test_metrics_of_a_cameras_status_appear_once_it_was_received(site_with_people: ServedSite) -> None:
     before = await samples(site_with_people)
     assert ("myview_camera_waiting_frames", A) not in before
-    site_with_people.service.ingest.status(status(A, waiting=7, fps=12.5, synchronized=False))
+    site_with_people.service.ingest.receive_status(status(A, waiting=7, fps=12.5, synchronized=False))
     metrics = await samples(site_with_people)
     assert metrics["myview_camera_waiting_frames", A] == 7
     assert metrics["myview_camera_fps", A] == 12.5
@@ -78,8 +80,8 @@ async def test_metrics_of_a_cameras_status_appear_once_it_was_received(site_with
 
 
 async def test_invalid_messages_are_counted_at_every_receiver(served: ServedSite) -> None:
-    served.service.ingest.tracks(Message(ZenohKeys("hall").camera(A, "tracks"), b"{", b""))
-    served.service.ingest.status(status(B, bad_messages=3))
+    served.service.ingest.receive_tracks(Message(ZenohKeys("hall").camera(A, "tracks"), b"{", b""))
+    served.service.ingest.receive_status(status(B, bad_messages=3))
     metrics = {key[1:]: value for key, value in (await samples(served)).items() if key[0] == _BAD}
     assert metrics == {(A, "sent"): 1, (B, "sent"): 0, (B, "received"): 3}
 
@@ -206,5 +208,7 @@ async def test_a_site_without_pulses_or_live_cameras_is_not_ready(site_with_peop
     assert await ready(site_with_people) == (503, "no pulse received for 60 s")
     site_with_people.service.pulses.received_at = time.monotonic()
     for camera in CAMERAS:
-        site_with_people.service.ingest.alive(ZenohKeys("hall").camera(camera, "alive"), is_present=False)
+        site_with_people.service.ingest.set_present(
+            ZenohKeys("hall").camera(camera, "alive"), is_present=False
+        )
     assert await ready(site_with_people) == (503, "no camera delivers frames")

@@ -31,8 +31,8 @@ async def printed(served: ServedSite) -> ExportedMetrics:
     link = LinkSettings(connect="tcp/127.0.0.1:1", url="http://yard/")
     served.service.other_sites.sites["yard"] = LinkedSite("yard", link)
     for camera in CAMERAS:
-        served.service.ingest.status(status(camera))
-        served.service.ingest.tracks(tracks(camera_tracks(camera, 2, {}, solved_at=1.0)))
+        served.service.ingest.receive_status(status(camera))
+        served.service.ingest.receive_tracks(tracks(camera_tracks(camera, 2, {}, solved_at=1.0)))
         served.service.ingest.states[camera].unavailable = Unavailability("off", "unopened", time.time() + 60)
     async with served.session.get("/metrics") as answer:
         assert answer.status == 200
@@ -126,10 +126,10 @@ def test_the_evaluator_reports_invalid_expressions(expression: str, error: str) 
 async def test_a_covered_lens_fires_one_alert(
     site_with_people: ServedSite, condition: str, covered_share: float, alerts: list[str]
 ) -> None:
-    site_with_people.service.ingest.status(
+    site_with_people.service.ingest.receive_status(
         status(CAMERAS[0], condition=condition, covered_share=covered_share)
     )
-    site_with_people.service.ingest.status(status(CAMERAS[1]))
+    site_with_people.service.ingest.receive_status(status(CAMERAS[1]))
     async with site_with_people.session.get("/metrics") as answer:
         metrics = ExportedMetrics.of(await answer.text())
     firing = {

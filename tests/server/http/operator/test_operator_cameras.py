@@ -15,7 +15,7 @@ from server.messaging.messages import ZenohKeys
 
 
 async def test_every_camera_is_listed_with_its_measurements(site_with_people: ServedSite) -> None:
-    site_with_people.service.ingest.status(status(A, missed=3, shed=2, clock_offset=0.25))
+    site_with_people.service.ingest.receive_status(status(A, missed=3, shed=2, clock_offset=0.25))
     site_with_people.service.joint.offsets = {A: 0.12}
     answer = (await site_with_people.get_json("/api/operator/cameras"))["cameras"]
     plain = (await site_with_people.get_json("/api/cameras"))["cameras"]
@@ -36,21 +36,21 @@ async def test_the_last_error_is_shown_until_the_next_one(site_with_people: Serv
         return str(camera["last_error"]["text"])
 
     ingest = site_with_people.service.ingest
-    ingest.status(Message(ZenohKeys("hall").camera(A, "status"), b"{}", b""))
+    ingest.receive_status(Message(ZenohKeys("hall").camera(A, "status"), b"{}", b""))
     assert "invalid message: " in await trouble()
-    ingest.status(status(A, state="away"))
+    ingest.receive_status(status(A, state="away"))
     assert await trouble() == "its source delivers no frames; retrying"
-    ingest.status(status(A, state="live"))
+    ingest.receive_status(status(A, state="live"))
     assert await trouble() == "its source delivers no frames; retrying"
-    ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
+    ingest.set_present(ZenohKeys("hall").camera(A, "alive"), is_present=False)
     assert await trouble() == "its process disconnected"
 
 
 async def test_only_operators_see_why_a_camera_cannot_be_opened(site_with_people: ServedSite) -> None:
     """The reason may name an address in the cameras' network."""
     ingest, reason = site_with_people.service.ingest, "rtsp://10.0.0.9: Connection refused"
-    ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
-    ingest.unavailable(unavailable(A, "unopened", 10.0, reason))
+    ingest.set_present(ZenohKeys("hall").camera(A, "alive"), is_present=False)
+    ingest.receive_unavailable(unavailable(A, "unopened", 10.0, reason))
     operators, viewers = [
         (await site_with_people.get_json(path))["cameras"][0]["message"]
         for path in ("/api/operator/cameras", "/api/cameras")
@@ -72,10 +72,10 @@ async def test_a_camera_that_waits_to_be_opened_again_says_until_when(site_with_
     assert await retry_at() is None
     assert not await exported("myview_camera_retry_seconds")
     for change in (1, 2):
-        ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
+        ingest.set_present(ZenohKeys("hall").camera(A, "alive"), is_present=False)
         for pause_s in (50.0, 40.0):  # it is told again, to a service that has connected
             began = time.time()
-            ingest.unavailable(unavailable(A, "changed", pause_s, "its images are small"))
+            ingest.receive_unavailable(unavailable(A, "changed", pause_s, "its images are small"))
             until = await retry_at()
             assert until is not None
             assert began + pause_s <= until <= time.time() + pause_s
@@ -83,9 +83,9 @@ async def test_a_camera_that_waits_to_be_opened_again_says_until_when(site_with_
         assert line.startswith(f'myview_camera_retry_seconds{{camera="{A}",cause="changed"}} ')
         assert 0 < float(line.split()[1]) <= 40
         assert f'{{camera="{A}"}} {change}.0' in (await exported("myview_camera_stream_changes_total"))[0]
-        ingest.unavailable(unavailable(A, "changed", 0.0, "its images are small"))
+        ingest.receive_unavailable(unavailable(A, "changed", 0.0, "its images are small"))
         assert await retry_at() is None, "it is being opened"
-        ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=True)
+        ingest.set_present(ZenohKeys("hall").camera(A, "alive"), is_present=True)
         assert not await exported("myview_camera_retry_seconds")
 
 

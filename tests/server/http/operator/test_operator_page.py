@@ -109,9 +109,9 @@ async def test_every_camera_has_a_tile_with_its_state(browser: Browser) -> None:
             await tile.locator("dt").all_text_contents()
             == await page.locator(".camera-tile >> nth=1 >> dt").all_text_contents()
         )
-        served.service.ingest.status(status(A, missed=3, clock_offset=-0.25))
+        served.service.ingest.receive_status(status(A, missed=3, clock_offset=-0.25))
         await expect(tile.get_by_text("-250 ms")).to_be_visible()
-        served.service.ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
+        served.service.ingest.set_present(ZenohKeys("hall").camera(A, "alive"), is_present=False)
         await expect(tile.locator(".state")).to_have_text("Gone")
         await expect(tile.locator(".last-error")).to_contain_text("its process disconnected")
         await expect(page.locator("#pulses")).to_contain_text("there is no pulse server at")
@@ -342,15 +342,15 @@ async def check_deletion(page: Page, number: int) -> None:
 async def test_a_tile_says_what_is_wrong_with_the_picture(browser: Browser) -> None:
     async with open_operator_page(browser, "#cameras") as (served, page):
         show_people(served)
-        served.service.ingest.status(status(A, condition="turned", condition_since=1.0))
+        served.service.ingest.receive_status(status(A, condition="turned", condition_since=1.0))
         tile = page.locator(".camera-tile").first
         await expect(tile.locator(".state")).to_contain_text("Turned away since ")
         await expect(tile.locator(".last-error")).to_contain_text("the camera is turned away: ")
-        served.service.ingest.status(status(A, covered_share=0.35))
+        served.service.ingest.receive_status(status(A, covered_share=0.35))
         await expect(tile.locator(".state")).to_have_text("35 % covered")
         await expect(tile).to_have_class("camera-tile unclear")
         await expect(tile.locator(".last-error")).to_contain_text("35 % of the picture is covered: ")
-        served.service.ingest.status(status(A))
+        served.service.ingest.receive_status(status(A))
         await expect(tile.locator(".state")).to_have_text("Live")
 
 
@@ -359,16 +359,16 @@ async def test_a_tile_says_that_a_camera_waits_why_and_until_when(browser: Brows
         show_people(served)
         tile = page.locator(".camera-tile").first
         await expect(tile.locator(".state")).to_have_text("Live")
-        served.service.ingest.alive(ZenohKeys("hall").camera(A, "alive"), is_present=False)
-        served.service.ingest.unavailable(unavailable(A, "changed", 3600.0, "10.0.0.9: its images are small"))
+        served.service.ingest.set_present(ZenohKeys("hall").camera(A, "alive"), is_present=False)
+        served.service.ingest.receive_unavailable(unavailable(A, "changed", 3600.0, "10.0.0.9: its images are small"))
         await expect(tile.locator(".state")).to_have_text("Waiting")
         line = r"Will be opened again at \d.*: 10\.0\.0\.9: its images are small"
         await expect(tile.locator(".last-error")).to_have_text(re.compile(line))
-        served.service.ingest.unavailable(unavailable(A, "changed", 0.0, "10.0.0.9: its images are small"))
+        served.service.ingest.receive_unavailable(unavailable(A, "changed", 0.0, "10.0.0.9: its images are small"))
         await expect(tile.locator(".last-error")).to_have_text("10.0.0.9: its images are small")
         await expect(tile.locator(".state")).to_have_text("Gone")
         served.service.connect_cameras(A)
-        served.service.ingest.status(status(A))
+        served.service.ingest.receive_status(status(A))
         await expect(tile.locator(".state")).to_have_text("Live")
 
 
@@ -378,8 +378,10 @@ async def test_flags_are_listed_with_their_state(browser: Browser) -> None:
         show_people(served)
         served.service.decider.people.registry.set_name(1, "Ann")
         trouble = RiskEvent(reason="crossing", tracks=[2, 1], pulse=29, margin=0.1, risk=0.5)
-        served.service.ingest.tracks(tracks(camera_tracks(A, 3, {1: SMALL, 2: SMALL}, risk_events=[trouble])))
-        served.service.ingest.tracks(tracks(camera_tracks(B, 3, {1: LARGE})))
+        served.service.ingest.receive_tracks(
+            tracks(camera_tracks(A, 3, {1: SMALL, 2: SMALL}, risk_events=[trouble]))
+        )
+        served.service.ingest.receive_tracks(tracks(camera_tracks(B, 3, {1: LARGE})))
         served.service.pulses.newest = 19
         served.service.decide()
         line = page.locator("#flag-list li")

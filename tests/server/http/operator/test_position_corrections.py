@@ -127,10 +127,10 @@ async def test_a_flag_is_raised_followed_answered_and_counted(assisted: ServedSi
     crossing = RiskEvent(reason="crossing", tracks=[1, 2], pulse=expected, margin=0.1, risk=0.5)
     unknown = [RiskEvent(reason="optimality_gap", tracks=[], pulse=17, margin=0.0, risk=0.5)]
     unknown += [RiskEvent(reason="track_loss", tracks=[77], pulse=17, margin=0.0, risk=0.5)]
-    assisted.service.ingest.tracks(
+    assisted.service.ingest.receive_tracks(
         tracks(camera_tracks(A, 3, {1: SMALL, 2: SMALL}, risk_events=[*unknown, crossing]))
     )
-    assisted.service.ingest.tracks(tracks(camera_tracks(B, 3, {1: LARGE})))
+    assisted.service.ingest.receive_tracks(tracks(camera_tracks(B, 3, {1: LARGE})))
     assisted.service.pulses.newest = 4 * STRIDE - 1
     assisted.service.decide()
 

@@ -96,7 +96,7 @@ async def test_pictures_wait_for_a_late_decision_and_none_is_lost(site_with_peop
     async with site_with_people.session.get("/objects/1/best.mp4?delay=live") as answer:
         for seed, camera in enumerate(CAMERAS):  # two more GOPs of pictures, whose decisions are late
             for unit in encoded(seed)[3 * GOP : 6 * GOP]:
-                service.ingest.video(video(camera, unit))
+                service.ingest.receive_video(video(camera, unit))
         service.feed(3, SEEN)
         service.feed(4, SEEN)
         data = await read_to(answer, b"moof")

@@ -58,8 +58,8 @@ def feed(served: ServedSite, epoch: int) -> None:
     sizes = {A: SMALL, B: LARGE} if epoch % 4 < 2 else {A: LARGE, B: SMALL}
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed, EPOCHS * STRIDE)[epoch * STRIDE : (epoch + 1) * STRIDE]:
-            served.service.ingest.video(video(camera, unit))
-        served.service.ingest.tracks(tracks(camera_tracks(camera, epoch, {1: sizes[camera]})))
+            served.service.ingest.receive_video(video(camera, unit))
+        served.service.ingest.receive_tracks(tracks(camera_tracks(camera, epoch, {1: sizes[camera]})))
     served.service.pulses.newest = end_of_epoch(epoch, STRIDE)
     served.service.pulses.pulse0 = 1_800_000_000.0
     served.service.decide()

@@ -51,8 +51,8 @@ class Site:
         ]
         if boxes is not None:
             message = camera_tracks(A, self._epoch, {}, tracks=seen, **changes)
-            self.service.ingest.tracks(tracks(message))
-        self.service.ingest.tracks(tracks(camera_tracks(B, self._epoch, {})))
+            self.service.ingest.receive_tracks(tracks(message))
+        self.service.ingest.receive_tracks(tracks(camera_tracks(B, self._epoch, {})))
         self.service.pulses.newest = end_of_epoch(self._epoch, STRIDE)
         self.service.decide()
         self._epoch += 1

@@ -68,7 +68,7 @@ class Site:
         service.state_replication._send = self._send_identities
         for camera in CAMERAS:
             for part in (service.ingest, service.state_replication):
-                part.alive(KEYS.camera(camera, "alive"), is_present=True)
+                part.set_present(KEYS.camera(camera, "alive"), is_present=True)
             if camera != without_snapshot:
                 self.cameras[camera].on_service(is_present=True)
         return service
@@ -77,7 +77,9 @@ class Site:
         """Push epochs with these tracks, without pictures."""
         for epoch in epochs:
             for camera in CAMERAS:
-                self.service.ingest.tracks(tracks(camera_tracks(camera, epoch, seen[camera], boot=boot)))
+                self.service.ingest.receive_tracks(
+                    tracks(camera_tracks(camera, epoch, seen[camera], boot=boot))
+                )
             self.service.pulses.newest = end_of_epoch(epoch, STRIDE)
             self.service.decide()
 
@@ -342,20 +344,20 @@ def test_decisions_wait_for_the_snapshots_of_connected_cameras() -> None:
     replication = StateReplication(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
     replication.begin(4)
     assert not replication.is_waiting, "no camera is connected"
-    replication.alive(KEYS.camera(A, "alive"), is_present=True)
-    replication.alive(KEYS.camera("cellar", "alive"), is_present=True)
-    replication.alive(KEYS.camera(B, "alive"), is_present=True)
+    replication.set_present(KEYS.camera(A, "alive"), is_present=True)
+    replication.set_present(KEYS.camera("cellar", "alive"), is_present=True)
+    replication.set_present(KEYS.camera(B, "alive"), is_present=True)
     assert replication.is_waiting
-    replication.snapshot_received(Message(KEYS.camera(A, "retained_identities"), b"", b""))
+    replication.receive_snapshot(Message(KEYS.camera(A, "retained_identities"), b"", b""))
     assert replication.is_waiting
-    replication.alive(KEYS.camera(A, "alive"), is_present=True)
-    replication.alive(KEYS.camera(B, "alive"), is_present=False)
+    replication.set_present(KEYS.camera(A, "alive"), is_present=True)
+    replication.set_present(KEYS.camera(B, "alive"), is_present=False)
     assert not replication.is_waiting, "a snapshot may arrive before the liveliness token"
-    replication.alive(KEYS.camera(B, "alive"), is_present=True)
+    replication.set_present(KEYS.camera(B, "alive"), is_present=True)
     clock.now += SNAPSHOT_WAIT_S
     assert not replication.is_waiting, "a frozen camera is waited for only so long"
     replication.begin(9)
-    replication.alive(KEYS.camera(A, "alive"), is_present=True)
+    replication.set_present(KEYS.camera(A, "alive"), is_present=True)
     assert not replication.is_waiting, "only at the start"
 
 
@@ -526,7 +528,7 @@ def test_a_flapping_camera_without_a_snapshot_is_waited_for_once() -> None:
     clock, service = Clock(), FedService(small_config())
     replication = StateReplication(service.decider.people, CAMERAS, FPS, lambda *_: None, clock=clock)
     for _ in range(4):
-        replication.alive(KEYS.camera(B, "alive"), is_present=False)
-        replication.alive(KEYS.camera(B, "alive"), is_present=True)
+        replication.set_present(KEYS.camera(B, "alive"), is_present=False)
+        replication.set_present(KEYS.camera(B, "alive"), is_present=True)
         clock.now += SNAPSHOT_WAIT_S / 2
     assert not replication.is_waiting

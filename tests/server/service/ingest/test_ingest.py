@@ -52,15 +52,15 @@ class IngestWithBuffers:
         self.frames: list[tuple[str]] = []
         self.ingest = Ingest(self.frame_buffers, self.aligner, lambda *frame: self.frames.append(frame))
         for camera in CAMERAS:
-            self.ingest.alive(KEYS.camera(camera, "alive"), is_present=True)
+            self.ingest.set_present(KEYS.camera(camera, "alive"), is_present=True)
 
     def handle(self, kind: str, message: Message) -> None:
         handlers = {
-            "video": self.ingest.video,
-            "tracks": self.ingest.tracks,
-            "status": self.ingest.status,
-            "thumbs": self.ingest.thumbnail,
-            "unavailable": self.ingest.unavailable,
+            "video": self.ingest.receive_video,
+            "tracks": self.ingest.receive_tracks,
+            "status": self.ingest.receive_status,
+            "thumbs": self.ingest.receive_thumbnail,
+            "unavailable": self.ingest.receive_unavailable,
         }
         handlers[kind](message)
 
@@ -104,7 +104,7 @@ def test_a_connected_cameras_load_text_is_its_message() -> None:
     served.handle("status", status("c0"))
     assert state.message == ""
     served.handle("status", status("c0", load_level=2, load=text))
-    served.ingest.alive(KEYS.camera("c0", "alive"), is_present=False)
+    served.ingest.set_present(KEYS.camera("c0", "alive"), is_present=False)
     assert state.message == ""
 
 
@@ -167,7 +167,7 @@ def test_a_camera_that_was_knocked_is_to_be_calibrated_again() -> None:
 def test_why_a_camera_cannot_be_opened_is_for_operators_until_it_connects() -> None:
     served = IngestWithBuffers()
     state = served.ingest.states["c0"]
-    served.ingest.alive(KEYS.camera("c0", "alive"), is_present=False)
+    served.ingest.set_present(KEYS.camera("c0", "alive"), is_present=False)
     served.handle("unavailable", UNAVAILABLE)
     assert state.unavailable is not None
     assert (state.unavailable.reason, state.unavailable.retry_s, state.message) == (REASON, 0.0, "")
@@ -176,7 +176,7 @@ def test_why_a_camera_cannot_be_opened_is_for_operators_until_it_connects() -> N
     assert first.text == REASON
     served.handle("unavailable", UNAVAILABLE)
     assert state.metrics.last_error is first, "it is recorded once"
-    served.ingest.alive(KEYS.camera("c0", "alive"), is_present=True)
+    served.ingest.set_present(KEYS.camera("c0", "alive"), is_present=True)
     assert state.unavailable is None
     served.handle("unavailable", UNAVAILABLE)
     assert state.unavailable is None, "it was late"
@@ -204,7 +204,7 @@ def test_arbitrary_bytes_are_counted_and_dropped(kind: str, payload: bytes, atta
 def test_arbitrary_keys_are_ignored(kind: str, key: str) -> None:
     served = IngestWithBuffers()
     served.handle(kind, Message(key, b"", b""))
-    served.ingest.alive(key, is_present=True)
+    served.ingest.set_present(key, is_present=True)
     assert served.bad() == 0
 
 
@@ -253,16 +253,16 @@ def test_inconsistent_tracks_are_refused(changes: dict[str, Any]) -> None:
     served = IngestWithBuffers()
     sent = msgspec.msgpack.decode(GOOD["tracks"].payload)
     payload = as_message(sent | msgspec.to_builtins(changes, builtin_types=(bytes,)))
-    served.ingest.tracks(Message(GOOD["tracks"].key, payload, b""))
+    served.ingest.receive_tracks(Message(GOOD["tracks"].key, payload, b""))
     assert served.bad() == 1
 
 
 def test_unconfigured_cameras_are_ignored(caplog: pytest.LogCaptureFixture) -> None:
     served = IngestWithBuffers()
-    served.ingest.video(video("cellar", encoded(0)[0]))
-    served.ingest.tracks(tracks(camera_tracks("cellar", 0, {})))
+    served.ingest.receive_video(video("cellar", encoded(0)[0]))
+    served.ingest.receive_tracks(tracks(camera_tracks("cellar", 0, {})))
     for is_present in (True, False) * 5:
-        served.ingest.alive(KEYS.camera("cellar", "alive"), is_present=is_present)
+        served.ingest.set_present(KEYS.camera("cellar", "alive"), is_present=is_present)
     assert len(caplog.messages) == 1
     assert list(served.ingest.states) == list(CAMERAS)
     assert not served.frames
@@ -270,9 +270,9 @@ def test_unconfigured_cameras_are_ignored(caplog: pytest.LogCaptureFixture) -> N
 
 def test_a_camera_with_other_parameter_sets_is_refused() -> None:
     served = IngestWithBuffers()
-    served.ingest.video(video("c0", encoded(0)[0]))
+    served.ingest.receive_video(video("c0", encoded(0)[0]))
     for unit in encoded(1, crf=40)[:10]:
-        served.ingest.video(video("c1", unit))
+        served.ingest.receive_video(video("c1", unit))
     state = served.ingest.states["c1"]
     assert state.label == "refused"
     assert "differ from the other cameras'" in state.refused
@@ -284,11 +284,11 @@ def test_a_camera_with_other_parameter_sets_is_refused() -> None:
 
 def test_a_refused_camera_is_accepted_after_a_restart_with_the_right_settings() -> None:
     served = IngestWithBuffers()
-    served.ingest.video(video("c0", encoded(0)[0]))
-    served.ingest.video(video("c1", encoded(1, crf=40)[0]))
-    served.ingest.alive(KEYS.camera("c1", "alive"), is_present=False)
-    served.ingest.alive(KEYS.camera("c1", "alive"), is_present=True)
-    served.ingest.video(video("c1", encoded(1)[5], boot=2))
+    served.ingest.receive_video(video("c0", encoded(0)[0]))
+    served.ingest.receive_video(video("c1", encoded(1, crf=40)[0]))
+    served.ingest.set_present(KEYS.camera("c1", "alive"), is_present=False)
+    served.ingest.set_present(KEYS.camera("c1", "alive"), is_present=True)
+    served.ingest.receive_video(video("c1", encoded(1)[5], boot=2))
     assert served.ingest.states["c1"].label == "live"
     assert served.frame_buffers["c1"].has(5)
 
@@ -297,28 +297,28 @@ def test_a_cameras_state_follows_its_messages() -> None:
     served = IngestWithBuffers()
     state = served.ingest.states["c0"]
     labels = [state.label]
-    served.ingest.video(video("c0", encoded(0)[0]))
+    served.ingest.receive_video(video("c0", encoded(0)[0]))
     labels.append(state.label)
-    served.ingest.alive(KEYS.camera("c0", "alive"), is_present=False)
+    served.ingest.set_present(KEYS.camera("c0", "alive"), is_present=False)
     labels.append(state.label)
-    served.ingest.alive(KEYS.camera("c0", "alive"), is_present=True)
-    served.ingest.tracks(tracks(camera_tracks("c0", 0, {}, ended=True)))
+    served.ingest.set_present(KEYS.camera("c0", "alive"), is_present=True)
+    served.ingest.receive_tracks(tracks(camera_tracks("c0", 0, {}, ended=True)))
     labels.append(state.label)
-    served.ingest.alive(KEYS.camera("c0", "alive"), is_present=False)
+    served.ingest.set_present(KEYS.camera("c0", "alive"), is_present=False)
     labels.append(state.label)
-    served.ingest.alive(KEYS.camera("c0", "alive"), is_present=True)
+    served.ingest.set_present(KEYS.camera("c0", "alive"), is_present=True)
     labels.append(state.label)
     assert labels == ["starting", "live", "gone", "ended", "ended", "live"]
 
 
 def test_thumbnails_are_kept_by_boot_and_track_until_they_expire_or_the_camera_disconnects() -> None:
     served = IngestWithBuffers()
-    served.ingest.thumbnail(thumbnail("c0", 1, b"old", pulse=5))
-    served.ingest.thumbnail(thumbnail("c0", 2, b"new", pulse=50))
-    served.ingest.thumbnail(thumbnail("c1", 1, b"other", pulse=50))
+    served.ingest.receive_thumbnail(thumbnail("c0", 1, b"old", pulse=5))
+    served.ingest.receive_thumbnail(thumbnail("c0", 2, b"new", pulse=50))
+    served.ingest.receive_thumbnail(thumbnail("c1", 1, b"other", pulse=50))
     served.ingest.forget_thumbnails_before(20)
     assert [kept.jpeg for kept in served.ingest.thumbnails.values()] == [b"new", b"other"]
-    served.ingest.alive(KEYS.camera("c1", "alive"), is_present=False)
+    served.ingest.set_present(KEYS.camera("c1", "alive"), is_present=False)
     assert list(served.ingest.thumbnails) == [("c0", 1, 2)]
 
 
@@ -342,9 +342,9 @@ def test_messages_of_pulses_far_in_the_future_are_counted_and_dropped() -> None:
 
 def test_thumbnails_are_limited_for_each_camera() -> None:
     served = IngestWithBuffers()
-    served.ingest.thumbnail(thumbnail("c1", 7, b"jpeg"))
+    served.ingest.receive_thumbnail(thumbnail("c1", 7, b"jpeg"))
     for track in range(1200):
-        served.ingest.thumbnail(thumbnail("c0", track, b"jpeg"))
+        served.ingest.receive_thumbnail(thumbnail("c0", track, b"jpeg"))
     assert len(served.ingest.thumbnails) == 301
     assert ("c0", 1, 1199) in served.ingest.thumbnails
     assert ("c1", 1, 7) in served.ingest.thumbnails
@@ -352,7 +352,7 @@ def test_thumbnails_are_limited_for_each_camera() -> None:
 
 def test_an_invalid_thumbnail_is_counted_and_dropped() -> None:
     served = IngestWithBuffers()
-    served.ingest.thumbnail(thumbnail("c0", 1, bytes(1 << 18)))
+    served.ingest.receive_thumbnail(thumbnail("c0", 1, bytes(1 << 18)))
     assert served.bad() == 1
     assert not served.ingest.thumbnails
 
@@ -364,7 +364,7 @@ def test_a_flapping_camera_writes_few_log_lines(
     served = IngestWithBuffers()
     caplog.clear()
     for is_present in (False, True) * 50:
-        served.ingest.alive(KEYS.camera("c0", "alive"), is_present=is_present)
+        served.ingest.set_present(KEYS.camera("c0", "alive"), is_present=is_present)
     assert caplog.messages == ["camera c0 disconnected", "camera c0 connected"] * 4 + [
         "camera c0 disconnected"
     ]
@@ -372,7 +372,7 @@ def test_a_flapping_camera_writes_few_log_lines(
 
 def test_a_status_is_kept() -> None:
     served = IngestWithBuffers()
-    served.ingest.status(status("c0", fps=24.5))
+    served.ingest.receive_status(status("c0", fps=24.5))
     current_status = served.ingest.states["c0"].status
     assert current_status is not None
     assert current_status.fps == 24.5
@@ -382,8 +382,8 @@ def test_frames_and_tracks_become_epochs() -> None:
     served = IngestWithBuffers()
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed)[:STRIDE]:
-            served.ingest.video(video(camera, unit))
-        served.ingest.tracks(tracks(camera_tracks(camera, 0, {1: LARGE})))
+            served.ingest.receive_video(video(camera, unit))
+        served.ingest.receive_tracks(tracks(camera_tracks(camera, 0, {1: LARGE})))
     [epoch] = served.aligner.take_ready(now=4)
     assert list(epoch.tracks) == list(CAMERAS)
     assert len(served.frames) == 2 * STRIDE

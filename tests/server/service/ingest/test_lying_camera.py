@@ -162,8 +162,12 @@ def correct_tracks(epoch: int) -> list[Message]:
 def deliver(service: FedService, message: Message) -> None:
     kind = message.key.split("/")[4]
     ingest = service.ingest
-    handlers = {"video": ingest.video, "tracks": ingest.tracks, "status": ingest.status}
-    handlers.get(kind, ingest.thumbnail)(message)
+    handlers = {
+        "video": ingest.receive_video,
+        "tracks": ingest.receive_tracks,
+        "status": ingest.receive_status,
+    }
+    handlers.get(kind, ingest.receive_thumbnail)(message)
 
 
 class LyingSite:
@@ -178,7 +182,7 @@ class LyingSite:
         self.shown: list[MediaChunk] = []
         """The chunks sent to viewers of the other camera."""
         service.pulses.newest = 0
-        service.ingest.video(video(OTHER, encoded(1)[0]))
+        service.ingest.receive_video(video(OTHER, encoded(1)[0]))
         for epoch in range(EPOCHS):
             self._send(epoch)
             for message in lying_messages(epoch):
@@ -192,10 +196,10 @@ class LyingSite:
     def _send(self, epoch: int) -> None:
         ingest = self.service.ingest
         for unit in encoded(1)[epoch * STRIDE : (epoch + 1) * STRIDE]:
-            ingest.video(video(OTHER, unit))
-        ingest.tracks(tracks(camera_tracks(OTHER, epoch, {7: LARGE})))
-        ingest.status(status(OTHER))
-        ingest.thumbnail(thumbnail(OTHER, 7, b"jpeg", pulse=end_of_epoch(epoch, STRIDE)))
+            ingest.receive_video(video(OTHER, unit))
+        ingest.receive_tracks(tracks(camera_tracks(OTHER, epoch, {7: LARGE})))
+        ingest.receive_status(status(OTHER))
+        ingest.receive_thumbnail(thumbnail(OTHER, 7, b"jpeg", pulse=end_of_epoch(epoch, STRIDE)))
 
     def _pass(self, pulse: int) -> None:
         while self.service.pulses.newest < pulse:
@@ -245,12 +249,12 @@ def test_finishing_decides_no_pulses_beyond_the_last_epoch() -> None:
     """Before the first pulse a frame far ahead cannot be recognized."""
     service = FedService(small_config())
     service.connect_cameras(*CAMERAS)
-    service.ingest.video(video(LIAR, replace(encoded(0)[0], pulse=FAR)))
+    service.ingest.receive_video(video(LIAR, replace(encoded(0)[0], pulse=FAR)))
     for seed, camera in enumerate(CAMERAS):
         for unit in encoded(seed)[: 2 * STRIDE]:
-            service.ingest.video(video(camera, unit))
-        service.ingest.tracks(tracks(camera_tracks(camera, 0, {1: LARGE})))
-        service.ingest.tracks(tracks(camera_tracks(camera, 1, {1: LARGE}, ended=True)))
+            service.ingest.receive_video(video(camera, unit))
+        service.ingest.receive_tracks(tracks(camera_tracks(camera, 0, {1: LARGE})))
+        service.ingest.receive_tracks(tracks(camera_tracks(camera, 1, {1: LARGE}, ended=True)))
     service.pulses.newest = 2 * STRIDE - 1
     service.decide()
     assert service.aligner.all_ended_and_decided

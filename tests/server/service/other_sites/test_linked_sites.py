@@ -204,13 +204,13 @@ async def test_a_number_of_another_site_is_restored_and_raises_no_own_one(sites:
     snapshots["c0"] = msgspec.structs.replace(snapshots["c0"], people=[high])
     restarted = FedService(sites.running["yard"].config)
     for camera, snapshot in snapshots.items():
-        restarted.state_replication.alive(KEYS.camera(camera, "alive"), is_present=True)
+        restarted.state_replication.set_present(KEYS.camera(camera, "alive"), is_present=True)
         message = Message(KEYS.camera(camera, "retained"), msgspec.msgpack.encode(snapshot), b"")
-        restarted.state_replication.snapshot_received(message)
+        restarted.state_replication.receive_snapshot(message)
     epoch = before.newest // STRIDE + 1
     for camera in CAMERAS:
         seen = {A: SMALL} if camera == "c0" else {}
-        restarted.ingest.tracks(tracks(camera_tracks(camera, epoch, seen)))
+        restarted.ingest.receive_tracks(tracks(camera_tracks(camera, epoch, seen)))
     restarted.pulses.newest = end_of_epoch(epoch, STRIDE)
     restarted.decide()
     people = restarted.decider.people

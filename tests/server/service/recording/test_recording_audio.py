@@ -71,7 +71,7 @@ def decide_gops(
     for gop in gops:
         for camera in CAMERAS:
             for unit in access_units(recording)[gop * GOP : (gop + 1) * GOP]:
-                service.ingest.video(video(camera, unit))
+                service.ingest.receive_video(video(camera, unit))
         camera = CAMERAS[gop % 2] if choices is None else choices[gop]
         choices_of_gop = GopChoices(
             first=gop * GOP, frames=GOP, choices={} if camera is None else {1: camera}, boxes={}, cuts=[]

@@ -193,7 +193,7 @@ def test_pictures_that_arrive_after_the_decision_are_recorded_too(tmp_path: Path
     for epoch in range(7):
         service.feed(epoch, {A: {1: SMALL}})
     for unit in encoded(1)[: 7 * GOP]:
-        service.ingest.video(video(B, unit))
+        service.ingest.receive_video(video(B, unit))
     service.feed(7, {A: {1: SMALL}})
     service.close()
     session = service.recorder.session

@@ -109,7 +109,7 @@ class Services:
                 service = self.running[index]
                 for camera in CAMERAS:
                     boxes = seen.get(camera, {})
-                    service.ingest.tracks(tracks(camera_tracks(camera, epoch, boxes)))
+                    service.ingest.receive_tracks(tracks(camera_tracks(camera, epoch, boxes)))
                 service.pulses.newest = end_of_epoch(epoch, STRIDE)
                 service.decide()
 

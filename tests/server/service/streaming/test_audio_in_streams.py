@@ -74,7 +74,7 @@ async def watched(
     for camera in CAMERAS:
         for unit in access_units(recording):
             if unit.pulse not in lost:
-                service.ingest.video(video(camera, unit))
+                service.ingest.receive_video(video(camera, unit))
     decide(service, 0, A)
     answers = [await served.session.get(path) for path in paths]
     for gop in range(1, GOPS):
@@ -119,10 +119,10 @@ async def test_a_camera_stream_has_audio_at_once_or_silence_half_a_second_later(
     own = send_audio(service, recording, silent=range(60, 1000))
     service.connect_cameras(*CAMERAS)
     units = access_units(recording)
-    service.ingest.video(video(B, units[0]))
+    service.ingest.receive_video(video(B, units[0]))
     answers = [await site_with_audio.session.get(f"/cameras/c1/live.{kind}") for kind in ("mp4", "ts")]
     for unit in units[1:]:
-        service.ingest.video(video(B, unit))
+        service.ingest.receive_video(video(B, unit))
         await asyncio.sleep(0.002)
     service.splicer.close()
     data, ts = [await answer.read() for answer in answers]
@@ -163,7 +163,7 @@ async def test_all_streams_share_the_bytes_of_the_audio(site_with_audio: ServedS
     send_audio(service, recording)
     for camera in CAMERAS:
         for unit in encoded(0):
-            service.ingest.video(video(camera, unit))
+            service.ingest.receive_video(video(camera, unit))
     both = (ObjectChoice(1, A, None, departed=False), ObjectChoice(2, B, None, departed=False))
     service.splicer.publish_decision(GopDecision(0, GOP, both, {}, {}, (), NO_REASON))
     segmenters = [service.splicer.segmenter_of_person(number) for number in (1, 2)]
@@ -204,7 +204,7 @@ async def test_the_site_names_its_audio_codec_and_ignores_invalid_audio(site_wit
         b'{"first":1,"sizes":[0]}',
         b'{"first":1,"sizes":[7]}',
     ):
-        site_with_audio.service.ingest.audio(type(good)(good.key, good.payload, bad))
+        site_with_audio.service.ingest.receive_audio(type(good)(good.key, good.payload, bad))
     state = site_with_audio.service.ingest.states[A]
     assert state.bad_messages == 5, "of the camera that sends the audio"
     assert state.metrics.last_error is not None
@@ -218,7 +218,7 @@ async def test_in_videos_with_boxes_a_beep_is_with_its_flash(
     own = send_audio(service, recording)
     service.connect_cameras(*CAMERAS)
     for unit in access_units(recording):
-        service.ingest.video(video(A, unit))
+        service.ingest.receive_video(video(A, unit))
     choice = ObjectChoice(1, A, None, departed=False)
     decisions = [GopDecision(gop * GOP, GOP, (choice,), {}, {}, (), NO_REASON) for gop in range(GOPS)]
     service.decision_state.put(decisions[0])
@@ -265,7 +265,7 @@ async def test_chromium_plays_both_to_the_end_where_either_is_missing(
     for camera in CAMERAS:
         for unit in access_units(recording):
             if unit.pulse not in range(30, 45):
-                service.ingest.video(video(camera, unit))
+                service.ingest.receive_video(video(camera, unit))
 
     def show(gop: int) -> None:
         decide(service, gop, CAMERAS[gop % 2])
@@ -289,7 +289,7 @@ async def test_a_recording_has_audio_from_its_first_picture_to_its_last(
     service.connect_cameras(*CAMERAS)
     for camera in CAMERAS:
         for unit in access_units(recording):
-            service.ingest.video(video(camera, unit))
+            service.ingest.receive_video(video(camera, unit))
     decide(service, 0, A)
     decide(service, 1, A)
     recorded = asyncio.create_task(

@@ -483,9 +483,7 @@ async def test_a_persons_recording_includes_earlier_sessions_with_the_same_numbe
         served.service.connect_cameras(*CAMERAS)
         snapshot = CameraIdentitySnapshot(pulse=19, boot=1, next_number=9, numbered_since=since, people=[])
         key = ZenohKeys("hall").camera(A, "retained_identities")
-        served.service.state_replication.snapshot_received(
-            Message(key, msgspec.msgpack.encode(snapshot), b"")
-        )
+        served.service.state_replication.receive_snapshot(Message(key, msgspec.msgpack.encode(snapshot), b""))
         for epoch in range(5, 8):
             served.service.feed(epoch, IN_A)
         await until_written(served, 1)
