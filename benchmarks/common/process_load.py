@@ -114,6 +114,6 @@ def _words(pid: int) -> list[str]:
         return []
 
 
-def lag_below(share: float, lags: Sequence[tuple[float, float]]) -> float:
-    """Return the histogram bound in seconds below which this share of the lags is."""
+def lag_percentile(share: float, lags: Sequence[tuple[float, float]]) -> float:
+    """Return a percentile of lags in seconds, by the bounds of a histogram with cumulative counts."""
     return next((bound for bound, count in lags if count >= share * lags[-1][1]), np.nan)

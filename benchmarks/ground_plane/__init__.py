@@ -1,1 +1,1 @@
-"""Ways to track people on a floor that several cameras share."""
+"""Methods to track people on a floor that several cameras share."""

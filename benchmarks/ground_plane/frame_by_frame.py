@@ -1,4 +1,4 @@
-"""The yardstick: places found frame by frame, linked by the Hungarian method with constant velocity."""
+"""A baseline: places found frame by frame, linked by the Hungarian method with constant velocity."""
 
 from __future__ import annotations
 

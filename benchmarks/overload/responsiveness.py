@@ -24,7 +24,7 @@ import numpy as np
 import yaml
 
 from benchmarks.common.environment import ROOT, one_thread_environment, parser
-from benchmarks.common.process_load import lag_below
+from benchmarks.common.process_load import lag_percentile
 from benchmarks.common.report import Report
 from server.cli.generated_config import free_port
 from server.http.metrics.event_loop_lag import LoopLag
@@ -193,7 +193,11 @@ def row(cameras: int, niceness: int, measured: Responsiveness) -> list[str]:
         if sample.name.endswith("_bucket")
     ]
     seconds = [measured.first_response_s, *(measured.response_time(percent) for percent in (50, 95, 100))]
-    bounds = [lag_below(0.95, measured.lags), lag_below(1.0, measured.lags), lag_below(0.95, own_lag)]
+    bounds = [
+        lag_percentile(0.95, measured.lags),
+        lag_percentile(1.0, measured.lags),
+        lag_percentile(0.95, own_lag),
+    ]
     return [
         *(str(cameras), str(niceness)),
         *(f"{second:.2f}" for second in seconds),

@@ -21,7 +21,7 @@ from benchmarks.common.environment import parser
 from benchmarks.common.report import Report
 from benchmarks.scaling.message_sizes import track_message_size
 from benchmarks.scaling.simulated_hall import SimulatedHall
-from benchmarks.scaling.simulated_site import SiteLoad, carry
+from benchmarks.scaling.simulated_site import SiteLoad, measure_load
 from benchmarks.scaling.timed_service import REST, STAGES
 
 _FPS = 25.0
@@ -141,7 +141,9 @@ def measure(options: argparse.Namespace) -> None:
             fps = options.fps or max(1.0, round(_FPS * min(1.0, (_EASY / cameras) ** _GROWTH)))
             hall = SimulatedHall(cameras, options.people)
             settle, epochs = (_QUICK_SETTLE, _QUICK_EPOCHS) if quick else (_SETTLE, _EPOCHS)
-            loads.append(carry(hall, fps, Path(temporary) / f"{cameras}", settle, epochs, options.share))
+            loads.append(
+                measure_load(hall, fps, Path(temporary) / f"{cameras}", settle, epochs, options.share)
+            )
             report.line(f"{cameras} cameras: {loads[-1].milliseconds:.1f} ms a frame")
     describe(report, loads)
     plot(loads, options.out / "scaling.png")

@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 
 from benchmarks.scaling.simulated_hall import HEIGHT, STRIDE, WIDTH, WINDOW, SimulatedHall, SimulatedTracker
-from camsync import PulseClient
+from camsync import Pulse, PulseClient
 from server.camera.encoder import AccessUnit, Encoder
 from server.config.loader import load_config
 from server.config.site_config import Config
@@ -48,7 +48,10 @@ async def serve(config: Config, hall: SimulatedHall, cameras: range) -> None:
     try:
         async with client as pulses:
             async for pulse in pulses:
-                _frames(bus, keys, hall, cameras, pulse.number, gop, boot)
+                unit = gop[pulse.number % len(gop)]
+                _frames(
+                    bus, [keys.camera(hall.ids[camera], "video") for camera in cameras], unit, pulse, boot
+                )
                 if (pulse.number + 1) % STRIDE == 0:
                     epoch = pulse.number // STRIDE
                     places = hall.places(max(0, pulse.number + 1 - WINDOW), pulse.number)
@@ -63,21 +66,12 @@ async def serve(config: Config, hall: SimulatedHall, cameras: range) -> None:
         bus.close()
 
 
-def _frames(
-    bus: Bus,
-    keys: ZenohKeys,
-    hall: SimulatedHall,
-    cameras: range,
-    pulse: int,
-    gop: list[AccessUnit],
-    boot: int,
-) -> None:
-    unit = gop[pulse % len(gop)]
+def _frames(bus: Bus, keys: list[str], unit: AccessUnit, pulse: Pulse, boot: int) -> None:
     now = time.time()
-    head = FrameHeader(pulse=pulse, key=unit.key, boot=boot, due=now, captured_at=now, encoded=now)
+    head = FrameHeader(pulse=pulse.number, key=unit.key, boot=boot, due=now, captured_at=now, encoded=now)
     attachment = msgspec.msgpack.encode(head)
-    for camera in cameras:
-        bus.publish(keys.camera(hall.ids[camera], "video"), unit.data, attachment)
+    for key in keys:
+        bus.publish(key, unit.data, attachment)
 
 
 def _tracks(bus: Bus, keys: ZenohKeys, message: CameraTracks) -> None:

@@ -11,15 +11,15 @@ import subprocess
 import sys
 import time
 import urllib.request
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 import yaml
 
 from benchmarks.common.environment import ROOT, one_thread_environment
-from benchmarks.common.process_load import lag_below
+from benchmarks.common.process_load import lag_percentile
 from benchmarks.scaling.simulated_hall import FPS, HEIGHT, STRIDE, WIDTH, SimulatedHall
 from benchmarks.scaling.timed_service import LISTS, REST, STAGES, ServiceTimes
 from server.cli.generated_config import free_port
@@ -76,7 +76,7 @@ class _Service:
     url: str
 
 
-def carry(
+def measure_load(
     hall: SimulatedHall, fps: float, folder: Path, settle: int, epochs: int, services: int = 1
 ) -> SiteLoad:
     """Run the site for `settle` epochs, and measure over the `epochs` after them.
@@ -95,65 +95,48 @@ def carry(
         after = [_Metrics.read(service.url) for service in running]
         memory = sum(_resident(service.process.pid) for service in running) / services
     since = list(zip(before, after, strict=True))
-    late = sum(new.late - old.late for old, new in since)
-    lag = max(new.lag_since(old) for old, new in since)
-    loads = [
-        _load(hall, fps, start, stop, memory, late, lag) for start, stop in zip(starts, stops, strict=True)
-    ]
-    stages = {name: sum(load.stages[name] for load in loads) / services for name in loads[0].stages}
-    return replace(loads[0], services=services, stages=stages)
-
-
-def _load(
-    hall: SimulatedHall,
-    fps: float,
-    start: ServiceTimes,
-    stop: ServiceTimes,
-    memory: float,
-    late: int,
-    lag: float,
-) -> SiteLoad:
-    frames = STRIDE * (stop.epochs - start.epochs)
-    stages = {name: 1e3 * (stop.seconds[name] - start.seconds[name]) / frames for name in STAGES}
-    stages[REST] = 1e3 * (stop.process - start.process) / frames - sum(stages.values())
-    # Lists of people are sent by wall-clock time, whatever the pulse rate.
-    stages[LISTS] *= frames / (FPS * (stop.at - start.at))
+    costs = [_costs(start, stop) for start, stop in zip(starts, stops, strict=True)]
     return SiteLoad(
         cameras=hall.cameras,
         people=hall.people,
         per_camera=hall.per_camera,
         fps=fps,
-        services=1,
-        stages=stages,
-        messages=FPS * (stop.messages - start.messages) / frames,
-        megabytes=FPS * (stop.size - start.size) / frames / 1e6,
+        services=services,
+        stages={name: sum(cost.stages[name] for cost in costs) / services for name in costs[0].stages},
+        messages=costs[0].messages,
+        megabytes=costs[0].megabytes,
         memory=memory,
-        late=late,
-        lag=lag,
-        epochs=stop.epochs - start.epochs,
+        late=sum(new.late - old.late for old, new in since),
+        lag=max(new.lag_since(old) for old, new in since),
+        epochs=costs[0].epochs,
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _ServiceCosts:
+    """What one service did between two measurements; fields as in `SiteLoad`."""
+
+    stages: dict[str, float]
+    messages: float
+    megabytes: float
+    epochs: int
+
+
+def _costs(start: ServiceTimes, stop: ServiceTimes) -> _ServiceCosts:
+    epochs = stop.epochs - start.epochs
+    frames = STRIDE * epochs
+    stages = {name: 1e3 * (stop.seconds[name] - start.seconds[name]) / frames for name in STAGES}
+    stages[REST] = 1e3 * (stop.process - start.process) / frames - sum(stages.values())
+    # Lists of people are sent by wall-clock time, whatever the pulse rate.
+    stages[LISTS] *= frames / (FPS * (stop.at - start.at))
+    messages = FPS * (stop.messages - start.messages) / frames
+    return _ServiceCosts(stages, messages, FPS * (stop.size - start.size) / frames / 1e6, epochs)
 
 
 @contextlib.contextmanager
 def _running(hall: SimulatedHall, fps: float, folder: Path, services: int) -> Iterator[list[_Service]]:
-    sync, *https = (free_port() for _ in range(1 + services))
-    config, slow_pulses = folder / "site.yaml", folder / "pulses.yaml"
-    routers = [f"tcp/127.0.0.1:{free_port()}" for _ in range(services)]
-    site = {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT}
-    content = {
-        "site": site,
-        "sync": {"port": sync, "start_timeout_s": 3.0},
-        "zenoh": {"connect": routers, "listen": routers[0]},
-        "track": {"joint": False},  # simulated cameras send tracks alone
-        # Slower pulses are later than the service expects.
-        "view": {"late_after_s": 12.5 / fps, "share": {"of": services}},
-        "cameras": [
-            {"id": name, "source": f"rtsp://{name}/", "ground": ground.tolist()}
-            for name, ground in zip(hall.ids, hall.grounds, strict=True)
-        ],
-    }
-    config.write_text(yaml.safe_dump(content), encoding="utf-8")
-    slow_pulses.write_text(yaml.safe_dump(content | {"site": site | {"fps": fps}}), encoding="utf-8")
+    config, slow_pulses, routers = _write_configs(hall, fps, folder, services)
+    https = [free_port() for _ in range(services)]
     halves = [range(hall.cameras // 2), range(hall.cameras // 2, hall.cameras)]
     with (folder / _LOG).open("wb") as log:
         started = [_start(log, "server.cli.main", "sync", str(slow_pulses))]
@@ -182,14 +165,42 @@ def _running(hall: SimulatedHall, fps: float, folder: Path, services: int) -> It
         try:
             yield running
         finally:
-            for process in started:
-                process.terminate()
-            for process in started:
-                try:
-                    process.wait(15.0)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-                    process.wait()
+            _terminate(started)
+
+
+def _write_configs(
+    hall: SimulatedHall, fps: float, folder: Path, services: int
+) -> tuple[Path, Path, list[str]]:
+    """Write the configurations of the site and of its slower pulse server; return them and the routers."""
+    routers = [f"tcp/127.0.0.1:{free_port()}" for _ in range(services)]
+    site = {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT}
+    content = {
+        "site": site,
+        "sync": {"port": free_port(), "start_timeout_s": 3.0},
+        "zenoh": {"connect": routers, "listen": routers[0]},
+        "track": {"joint": False},  # simulated cameras send tracks alone
+        # Slower pulses are later than the service expects.
+        "view": {"late_after_s": 12.5 / fps, "share": {"of": services}},
+        "cameras": [
+            {"id": name, "source": f"rtsp://{name}/", "ground": ground.tolist()}
+            for name, ground in zip(hall.ids, hall.grounds, strict=True)
+        ],
+    }
+    config, slow_pulses = folder / "site.yaml", folder / "pulses.yaml"
+    config.write_text(yaml.safe_dump(content), encoding="utf-8")
+    slow_pulses.write_text(yaml.safe_dump(content | {"site": site | {"fps": fps}}), encoding="utf-8")
+    return config, slow_pulses, routers
+
+
+def _terminate(processes: Sequence[subprocess.Popen[bytes]]) -> None:
+    for process in processes:
+        process.terminate()
+    for process in processes:
+        try:
+            process.wait(15.0)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
 
 
 def _start(log: IO[bytes], *words: str, **own: str) -> subprocess.Popen[bytes]:
@@ -230,7 +241,9 @@ class _Metrics:
 
     def lag_since(self, before: _Metrics) -> float:
         """Return the bound below which 95 % of the lags since are."""
-        return lag_below(0.95, [(bound, count - before.lags[bound]) for bound, count in self.lags.items()])
+        return lag_percentile(
+            0.95, [(bound, count - before.lags[bound]) for bound, count in self.lags.items()]
+        )
 
 
 def _resident(pid: int) -> float:

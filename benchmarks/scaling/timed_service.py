@@ -89,12 +89,12 @@ def watch(path: Path) -> None:
         part.write_text(json.dumps(now), encoding="utf-8")
         part.replace(path)
 
-    for name in ("tracks", "video", "thumbnail"):
+    for name in ("receive_tracks", "receive_video", "receive_thumbnail"):
         _count(name, count)
     for owner, method, stage in (
-        (Ingest, "tracks", "ingest tracks"),
-        (Ingest, "video", "ingest frames"),
-        (Ingest, "thumbnail", "ingest frames"),
+        (Ingest, "receive_tracks", "ingest tracks"),
+        (Ingest, "receive_video", "ingest frames"),
+        (Ingest, "receive_thumbnail", "ingest frames"),
         (EpochAligner, "take_next_ready", "align"),
         (IdentityRegistry, "update", "identities"),
         (PersonTracker, "_begin", "people"),

@@ -1,4 +1,4 @@
-"""The benchmark of a shared floor: its yardstick, its rows, and its answer where the data is missing."""
+"""The benchmark of a shared floor: its baseline, its rows, and its answer where the data is missing."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ import pytest
 from benchmarks.ground_plane import __main__ as benchmark
 from benchmarks.ground_plane import growth
 from benchmarks.ground_plane.frame_by_frame import track_frame_by_frame
+from benchmarks.ground_plane.methods import BY_FRAME, JOINT, rows_of, run_methods
 from benchmarks.ground_plane.square import SimulatedSquare
 from benchmarks.ground_plane.stages import NETWORK, OTHER, SOLVING, STAGES, StageClock
-from benchmarks.ground_plane.ways import BY_FRAME, JOINT, rows_of, run_ways
 from benchmarks.ground_plane.wildtrack import wildtrack
 from fakes.tracking.walked_floor import FPS, FloorNoise, detect_walkers, floor_views
 from tracking import create_solver
@@ -65,7 +65,7 @@ def test_a_real_crowd_is_tracked_better_jointly_than_frame_by_frame(
         for camera, frames in found.frames.items()
     }
     truth = {camera: [row for row in rows if row.frame <= CROWD_FRAMES] for camera, rows in scene.gt.items()}
-    joint, by_frame = run_ways(
+    joint, by_frame = run_methods(
         replace(scene, gt=truth), replace(found, frames=shown), [JOINT, BY_FRAME], "arcs"
     )
     assert joint.scores.joint.idf1 > max(0.8, by_frame.scores.joint.idf1)

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.scaling.__main__ import exponent
 from benchmarks.scaling.simulated_hall import STRIDE, WINDOW, SimulatedHall, SimulatedTracker
-from benchmarks.scaling.simulated_site import carry
+from benchmarks.scaling.simulated_site import measure_load
 from benchmarks.scaling.timed_service import REST, STAGES, ServiceTimes
 from bestview import foot_points, to_ground
 from server.messaging.messages import CameraTracks
@@ -73,7 +73,7 @@ def test_a_process_that_has_said_nothing_yet_has_no_times(tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_a_small_site_is_carried_in_time(tmp_path: Path) -> None:
-    load = carry(SimulatedHall(3, 5), 25.0, tmp_path / "site", settle=6, epochs=6)
+    load = measure_load(SimulatedHall(3, 5), 25.0, tmp_path / "site", settle=6, epochs=6)
     assert set(load.stages) == {*STAGES, REST}
     assert load.stages["identities"] > 0
     assert load.stages["splice"] > 0

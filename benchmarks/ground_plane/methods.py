@@ -1,9 +1,9 @@
-"""The compared ways: tracked jointly, per camera and joined afterwards, and frame by frame."""
+"""The compared methods: tracked jointly, per camera and joined afterwards, and frame by frame."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from benchmarks.bestview.association_baselines import by_nearest_feet, own_tracks, unassociated_tracks
@@ -36,10 +36,10 @@ JOINT, SERVED, JOINED, NEAREST, ALONE, BY_FRAME = (
 
 
 @dataclass(frozen=True, slots=True)
-class WayScore:
-    """The scores of one way on one scene."""
+class MethodScore:
+    """The scores of one method on one scene."""
 
-    way: str
+    method: str
     scores: MultiCameraScores
     ms: float
     """Processor time per frame of all cameras, without detection."""
@@ -47,18 +47,69 @@ class WayScore:
     """The same by stage, where it is known."""
 
 
-def run_ways(
-    scene: BenchmarkScene, detections: SceneDetections, ways: list[str], solver: str
-) -> Iterator[WayScore]:
-    """Run the selected ways on a scene."""
-    config = scene.config(track={"joint": False})
-    length = max(len(found.detections) for found in detections.frames.values())
-    homographies = scene.homographies
+def run_methods(
+    scene: BenchmarkScene, detections: SceneDetections, methods: list[str], solver: str
+) -> Iterator[MethodScore]:
+    """Run the selected methods on a scene."""
     cameras = {
         camera: GroundCamera(homography, *detections.frames[camera].size)
-        for camera, homography in homographies.items()
+        for camera, homography in scene.homographies.items()
     }
-    frames = [
+    frames = _by_frame(detections)
+    fps = scene.config().site.fps
+
+    def score(
+        method: str, rows: Rows, began: float, stages: Mapping[str, float] | None = None
+    ) -> MethodScore:
+        ms = 1e3 * (time.process_time() - began) / len(frames)
+        recordings = {camera: TruthAndTracks(scene.gt[camera], rows[camera]) for camera in scene.gt}
+        by_stage = {stage: 1e3 * seconds / len(frames) for stage, seconds in (stages or {}).items()}
+        return MethodScore(method, evaluate_cameras(recordings, MIN_IOU), ms, by_stage)
+
+    if JOINT in methods:
+        began = time.process_time()
+        with timed_stages() as clock:
+            tracker = GroundPlaneTracker(cameras, GroundSettings(), create_solver(solver), fps)
+            joint = rows_of(track_ground_plane(tracker, enumerate(frames)), cameras)
+        yield score(JOINT, joint, began, clock.seconds)
+    if BY_FRAME in methods:
+        began = time.process_time()
+        yield score(BY_FRAME, track_frame_by_frame(_in_meters(cameras, frames), frames, fps), began)
+    if SERVED in methods:
+        began = time.process_time()
+        served = scene.config(track={"joint": True})
+        yield score(SERVED, decide(served, track_scene(served, detections.frames)).tracks, began)
+    for method, rows, seconds in _per_camera(scene, detections, methods):
+        yield score(method, rows, time.process_time() - seconds)
+
+
+def _per_camera(
+    scene: BenchmarkScene, detections: SceneDetections, methods: list[str]
+) -> Iterator[tuple[str, Rows, float]]:
+    """Track in each camera once, and associate by the selected methods; yield each with its seconds."""
+    if not {JOINED, NEAREST, ALONE} & set(methods):
+        return
+    began = time.process_time()
+    config = scene.config(track={"joint": False})
+    messages = track_scene(config, detections.frames)
+    tracked = own_tracks(messages)
+    tracking_s = time.process_time() - began
+    associations: dict[str, Callable[[], Rows]] = {
+        JOINED: lambda: decide(config, messages).tracks,
+        NEAREST: lambda: by_nearest_feet(tracked, scene.homographies),
+        ALONE: lambda: unassociated_tracks(tracked),
+    }
+    for method, associate in associations.items():
+        if method in methods:
+            began = time.process_time()
+            rows = associate()
+            yield method, rows, tracking_s + time.process_time() - began
+
+
+def _by_frame(detections: SceneDetections) -> list[dict[str, Detections]]:
+    """Return the detections of each frame by camera; cameras that have ended are left out."""
+    length = max(len(found.detections) for found in detections.frames.values())
+    return [
         {
             camera: found.detections[index]
             for camera, found in detections.frames.items()
@@ -66,40 +117,6 @@ def run_ways(
         }
         for index in range(length)
     ]
-    fps = config.site.fps
-
-    def score(way: str, rows: Rows, began: float, stages: Mapping[str, float] | None = None) -> WayScore:
-        ms = 1e3 * (time.process_time() - began) / length
-        recordings = {camera: TruthAndTracks(scene.gt[camera], rows[camera]) for camera in scene.gt}
-        by_stage = {stage: 1e3 * seconds / length for stage, seconds in (stages or {}).items()}
-        return WayScore(way, evaluate_cameras(recordings, MIN_IOU), ms, by_stage)
-
-    if JOINT in ways:
-        began = time.process_time()
-        with timed_stages() as clock:
-            tracker = GroundPlaneTracker(cameras, GroundSettings(), create_solver(solver), fps)
-            joint = rows_of(track_ground_plane(tracker, enumerate(frames)), cameras)
-        yield score(JOINT, joint, began, clock.seconds)
-    if BY_FRAME in ways:
-        began = time.process_time()
-        yield score(BY_FRAME, track_frame_by_frame(_in_meters(cameras, frames), frames, fps), began)
-    if SERVED in ways:
-        began = time.process_time()
-        served = scene.config(track={"joint": True})
-        yield score(SERVED, decide(served, track_scene(served, detections.frames)).tracks, began)
-    if {JOINED, NEAREST, ALONE} & set(ways):
-        began = time.process_time()
-        messages = track_scene(config, detections.frames)
-        tracked = own_tracks(messages)
-        taken = time.process_time() - began
-        if JOINED in ways:
-            began = time.process_time() - taken
-            yield score(JOINED, decide(config, messages).tracks, began)
-        if NEAREST in ways:
-            began = time.process_time() - taken
-            yield score(NEAREST, by_nearest_feet(tracked, homographies), began)
-        if ALONE in ways:
-            yield score(ALONE, unassociated_tracks(tracked), time.process_time() - taken)
 
 
 def rows_of(frames: list[GroundFrame], cameras: Mapping[str, GroundCamera]) -> dict[str, list[MotRow]]:
