@@ -50,10 +50,10 @@ class GhostCheck:
             return 0
         ground_point = max(localized, key=lambda endpoint: endpoint.frame).ground_point
         sizes = np.array([picture_sizes.get(camera, (0, 0)) for camera in self._cameras], dtype=np.float64)
-        return int((fully_detectable(self._homographies, sizes, ground_point, height) & missing).sum())
+        return int((in_full_view(self._homographies, sizes, ground_point, height) & missing).sum())
 
 
-def fully_detectable(homographies: Floats, sizes: Floats, place: Floats, height: float) -> NDArray[np.bool_]:
+def in_full_view(homographies: Floats, sizes: Floats, place: Floats, height: float) -> NDArray[np.bool_]:
     """Return which of C cameras show a person at a place completely and large enough to be detected.
 
     Furniture and other people are not considered.

@@ -28,13 +28,13 @@ class ModePublisher:
 
     def publish_frame(self, camera: str, frame: EncodedPicture) -> None:
         """Publish a camera's frame in all streams that are not delayed."""
-        self.meter.arrived(frame.pulse)
+        self.meter.measure_arrival(frame.pulse)
         self._splicer.publish_frame(camera, frame)
 
     def record_balanced(self, choices: GopChoices) -> None:
         """Record a decision of the delay balanced, before it is published."""
         self._choices.put(choices)
-        self.meter.decided(DelayMode.BALANCED, choices.first)
+        self.meter.measure_decision(DelayMode.BALANCED, choices.first)
 
     def replace_balanced(self, change: Callable[[GopChoices], GopChoices]) -> None:
         """Replace every balanced decision that is kept for later ones by a changed one."""
@@ -56,10 +56,10 @@ class ModePublisher:
             for callback in self.on_decision:
                 callback(decision.mode, choices)
             if live:
-                self.meter.decided_live(decision)
+                self.meter.measure_live_decision(decision)
                 self._splicer.publish_live(decision, merged)
             else:
-                self.meter.decided(decision.mode, decision.first)
+                self.meter.measure_decision(decision.mode, decision.first)
                 self._splicer.publish_smooth(decision, merged)
             if writer is not None:
                 writer.write_views_or_skip(decision)

@@ -22,7 +22,7 @@ def check_viewers(config: Config) -> None:
     """
     if config.access.tokens is not None:
         read_tokens(config.access.tokens)
-    elif not (is_loopback(config.http.host) or config.access.open_to_all):
+    elif not (is_local_host(config.http.host) or config.access.open_to_all):
         raise UserError(
             f"http.host: {config.http.host} lets other machines watch, and there are no tokens: "
             "set access.tokens to a file of them (`myview token NAME` makes a line), or "
@@ -39,9 +39,9 @@ def check_rtsp(config: Config) -> None:
         UserError: `rtsp.host` is not a loopback address.
     """
     rtsp, access = config.rtsp, config.access
-    if is_loopback(rtsp.host) or access.tokens is not None or access.open_to_all:
+    if is_local_host(rtsp.host) or access.tokens is not None or access.open_to_all:
         return
-    if rtsp.service is not None and not is_loopback(urlsplit(rtsp.service).hostname or ""):
+    if rtsp.service is not None and not is_local_host(urlsplit(rtsp.service).hostname or ""):
         return
     raise UserError(
         f"rtsp.host: {rtsp.host} lets other machines watch, and there are no tokens: set access.tokens to "
@@ -56,7 +56,7 @@ def check_pulses(config: Config) -> None:
         UserError: `sync.bind` is not a loopback address.
     """
     sync = config.sync
-    if (sync.users is None or sync.tls.key is None) and not is_loopback(sync.bind):
+    if (sync.users is None or sync.tls.key is None) and not is_local_host(sync.bind):
         exposure = f"sync.bind: {sync.bind} lets other machines listen to the pulses"
         _check_network(config, exposure, "set sync.users and sync.tls")
 
@@ -71,14 +71,14 @@ def check_bus(config: Config) -> None:
     if zenoh.users is not None and zenoh.listen.startswith("tls/"):
         return
     match = _AUTHORITY.match(zenoh.listen)
-    if match is None or not is_loopback(match["host"].strip("[]")):
+    if match is None or not is_local_host(match["host"].strip("[]")):
         exposure = (
             f"zenoh.listen: {redact_zenoh_endpoint(zenoh.listen)} lets other machines send frames and tracks"
         )
         _check_network(config, exposure, "use tls/ and set zenoh.users")
 
 
-def is_loopback(host: str) -> bool:
+def is_local_host(host: str) -> bool:
     """Return whether a host is only reachable from this machine."""
     try:
         return ipaddress.ip_address(host).is_loopback

@@ -101,7 +101,7 @@ class LiveStream(StreamReader):
         self._listener.opened(streams[0] if streams else None)
         return streams
 
-    def _hear(self, packet: av.Packet[AudioStream]) -> None:
+    def _use_audio(self, packet: av.Packet[AudioStream]) -> None:
         if self._listener is not None:
             self._listener.packet(packet)
 

@@ -71,7 +71,7 @@ class StreamReader:
         """Return the audio stream to read beside the video, if any."""
         return ()
 
-    def _hear(self, packet: av.Packet[AudioStream]) -> None:
+    def _use_audio(self, packet: av.Packet[AudioStream]) -> None:
         """Use a packet of the audio."""
 
     def _run(self, opened: OpenedVideo | None) -> None:
@@ -111,7 +111,7 @@ class StreamReader:
                         first_at, last_at = now if first_at is None else first_at, now
                         self._log_recovered()
                 else:
-                    self._hear(cast("av.Packet[AudioStream]", packet))
+                    self._use_audio(cast("av.Packet[AudioStream]", packet))
         except StreamChangedError as error:
             reason = str(error)
         except (av.error.FFmpegError, OSError) as error:

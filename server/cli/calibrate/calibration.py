@@ -29,7 +29,7 @@ def calibrate_points(points: Path, out: Path, plan: Path, unit: str | None) -> l
     chosen_unit = None if unit is None else _checked("--unit", unit)
     marked = read_points(points)
     unit = chosen_unit or _checked(f"{points}: unit", marked.unit or UNNAMED)
-    with refusing(points):
+    with calibration_errors_as_user_errors(points):
         report = point_report.calibrate_points(marked, unit)
     plot_floor_plan(report.views, unit, plan)
     out.write_text(report.ground, encoding="utf-8")
@@ -47,7 +47,7 @@ def calibrate_from_walks(
     Raises:
         UserError: the walk covered too little.
     """
-    with refusing("calibrate"):
+    with calibration_errors_as_user_errors("calibrate"):
         outcome = calibrate_walk(walk, settings, person_height)
     if outcome.insufficient and not force:
         raise UserError(
@@ -60,7 +60,7 @@ def calibrate_from_walks(
 
 
 @contextmanager
-def refusing(source: Path | str) -> Iterator[None]:
+def calibration_errors_as_user_errors(source: Path | str) -> Iterator[None]:
     """Turn a CalibrationError into a UserError that names the input."""
     try:
         yield

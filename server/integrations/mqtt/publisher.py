@@ -139,9 +139,9 @@ class MqttPublisher:
                     self._published.clear()
                     self._devices.clear()
             elif isinstance(payload, bytes) and payload:
-                self._hear_of_person(topic, payload, is_retained=message.retain)
+                self._receive_person(topic, payload, is_retained=message.retain)
 
-    def _hear_of_person(self, topic: str, payload: bytes, *, is_retained: bool) -> None:
+    def _receive_person(self, topic: str, payload: bytes, *, is_retained: bool) -> None:
         """Keep what an earlier run has told; tell again what another area has told about who is here."""
         is_own = _area_of(payload) in {None, self._topics.area}
         if is_retained and is_own:

@@ -12,9 +12,9 @@ from server.media.letterbox import Letterbox
 from server.service.decision_files.decision_writer import DecisionWriter
 from server.service.decision_files.row_removal import (
     INTENT_FILE,
-    complete_earlier,
+    complete_earlier_runs,
     copy_without,
-    remove_from_earlier,
+    remove_from_earlier_runs,
     set_numbers_since,
     write_intent,
 )
@@ -58,7 +58,7 @@ class LiveDecisionWriter:
         self._late: list[_LateFrame] = []
         self._numbers_since = 0.0
         try:
-            if complete_earlier(folder):
+            if complete_earlier_runs(folder):
                 log.info("%s: completed the deletion of a person that was interrupted", folder)
         except (OSError, ValueError) as error:
             log.error("%s: an interrupted deletion cannot be completed: %s", folder, error)  # noqa: TRY400
@@ -100,7 +100,7 @@ class LiveDecisionWriter:
             OSError: writing fails; the rest is removed when a service starts here again.
         """
         await run_in_reader_thread(write_intent, self._folder, numbers)
-        await run_in_reader_thread(remove_from_earlier, self._folder, numbers)
+        await run_in_reader_thread(remove_from_earlier_runs, self._folder, numbers)
         for path, size in self._writer.sizes.items():
             draft = path.with_suffix(".new")
             await run_in_reader_thread(copy_without, path, draft, size, numbers)

@@ -61,30 +61,30 @@ def set_numbers_since(folder: Path, since: float) -> None:
     draft.replace(folder / NUMBERS_FILE)
 
 
-def remove_from_earlier(folder: Path, numbers: Collection[int]) -> None:
+def remove_from_earlier_runs(folder: Path, numbers: Collection[int]) -> None:
     """Remove people from folders of earlier runs beside one, where numbers mean the same people.
 
     Raises:
         OSError: it cannot be done.
     """
     since = _numbers_since(folder)
-    for earlier in _earlier(folder):
+    for earlier in _earlier_runs(folder):
         if since is not None and _numbers_since(earlier) == since:
             write_intent(earlier, numbers)
             complete_interrupted(earlier)
 
 
-def complete_earlier(folder: Path) -> bool:
+def complete_earlier_runs(folder: Path) -> bool:
     """Complete interrupted removals in folders of earlier runs beside one; return whether there were any.
 
     Raises:
         OSError, ValueError: as `complete_interrupted`.
     """
-    completed = [complete_interrupted(earlier) for earlier in _earlier(folder)]
+    completed = [complete_interrupted(earlier) for earlier in _earlier_runs(folder)]
     return any(completed)
 
 
-def _earlier(folder: Path) -> list[Path]:
+def _earlier_runs(folder: Path) -> list[Path]:
     """Return the folders of the runs of `myview up` that began with the same output folder."""
     root = folder.parent if _RESTART.fullmatch(folder.name) else folder
     runs = [root, *(path for path in sorted(root.glob("restart-*")) if _RESTART.fullmatch(path.name))]

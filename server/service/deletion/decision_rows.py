@@ -14,12 +14,12 @@ from server.system.private_files import write_private
 _DECODER = msgspec.json.Decoder(GopChoices)
 
 
-def mention(numbers: Collection[int]) -> re.Pattern[bytes]:
+def mention_pattern(numbers: Collection[int]) -> re.Pattern[bytes]:
     """Return a pattern that is in the JSON of every decision about one of these people, and in few others."""
     return re.compile(rb'[\[:"](?:%b)[,"}]' % b"|".join(b"%d" % number for number in sorted(numbers)))
 
 
-def decisions_in(path: Path, pattern: re.Pattern[bytes]) -> Iterator[GopChoices]:
+def decisions_with(path: Path, pattern: re.Pattern[bytes]) -> Iterator[GopChoices]:
     """Yield the decisions of a file that have a pattern; none of a file that is gone.
 
     Raises:
@@ -48,7 +48,7 @@ def remove_rows(path: Path, numbers: Collection[int]) -> None:
     Raises:
         OSError: the file cannot be replaced; it is unchanged.
     """
-    pattern = mention(numbers)
+    pattern = mention_pattern(numbers)
     lines = [
         line if pattern.search(line) is None else _without(line, numbers) for line in _lines(path, pattern)
     ]

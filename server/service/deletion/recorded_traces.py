@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from server.service.deletion.decision_rows import decisions_in, is_about, mention
+from server.service.deletion.decision_rows import decisions_with, is_about, mention_pattern
 from server.service.recording.person_removal import SegmentFile, check_in_place
 from server.service.recording.playlist_file import RecordingPlaylist
 from server.service.recording.recording_session import RecordingSession
@@ -76,7 +76,7 @@ def _with_merged(sessions: Sequence[RecordingSession], numbers: Collection[int])
         {merge.kept, merge.lost}
         for session in sessions
         for path in all_decision_files(session)
-        for choices in decisions_in(path, _HAS_MERGE)
+        for choices in decisions_with(path, _HAS_MERGE)
         for merge in choices.merged
     ]
     found, before = set(numbers), -1
@@ -89,11 +89,11 @@ def _with_merged(sessions: Sequence[RecordingSession], numbers: Collection[int])
 
 
 def _traces(session: RecordingSession, numbers: Collection[int]) -> SessionTraces:
-    traces, pattern, fps = SessionTraces(session), mention(numbers), session.info.fps
+    traces, pattern, fps = SessionTraces(session), mention_pattern(numbers), session.info.fps
     margin, gap = round(MARGIN_S * fps), round(_GAP_S * fps)
     seen: dict[str, list[PulseRange]] = {}
     for path in all_decision_files(session):
-        for choices in decisions_in(path, pattern):
+        for choices in decisions_with(path, pattern):
             traces.gops += is_about(choices, numbers)
             for camera, frames in choices.boxes.items():
                 pulses = [

@@ -155,7 +155,7 @@ class Ingest:
             log.error("camera %s is refused: %s", camera, state.refused)  # noqa: TRY400 — a traceback adds nothing
         else:
             state.frames += 1
-            state.metrics.frame(head)
+            state.metrics.measure_frame(head)
             self._aligner.frame_received(camera, head.boot, head.pulse)
             self._on_frame(camera, frame)
 
@@ -183,7 +183,7 @@ class Ingest:
             return
         if self._is_far_ahead(state, end_of_epoch(tracks.epoch, self._aligner.stride)):
             return
-        state.metrics.window(tracks)
+        state.metrics.measure_window(tracks)
         state.ended = tracks.ended
         self._aligner.add_tracks(tracks)
         if tracks.ended:

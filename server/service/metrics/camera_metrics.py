@@ -67,12 +67,12 @@ class StageTotals:
         """The stages by name, in the order in which a frame passes them."""
         return {name: getattr(self, name) for name in ("take", "encode", "search", "solve", "track")}
 
-    def frame(self, head: FrameHeader) -> None:
+    def count_frame(self, head: FrameHeader) -> None:
         """Count a frame."""
         self.take.observe(head.captured_at - head.due)
         self.encode.observe(head.encoded - head.captured_at)
 
-    def window(self, tracks: CameraTracks, due: float | None, *, optimal: bool) -> None:
+    def count_window(self, tracks: CameraTracks, due: float | None, *, optimal: bool) -> None:
         """Count a window; ``due`` is when its last frame was due, None: unknown."""
         self.corrected += tracks.revised_from is not None
         if tracks.detection_s is not None:
@@ -117,22 +117,22 @@ class CameraMetrics:
         for measured in (self._errors, self._due, self._delays, self._optimal):
             measured.clear()
 
-    def frame(self, head: FrameHeader) -> None:
+    def measure_frame(self, head: FrameHeader) -> None:
         """Measure a frame by its header."""
-        self.totals.frame(head)
+        self.totals.count_frame(head)
         self._errors.append(head.captured_at - head.due)
         self._due[head.pulse] = head.due
         while len(self._due) > _FRAMES:
             self._due.popitem(last=False)
 
-    def window(self, tracks: CameraTracks) -> None:
+    def measure_window(self, tracks: CameraTracks) -> None:
         """Measure a solved window."""
         self.size = tracks.size
         optimal = tracks.solve is not None and tracks.solve.gap <= _OPTIMAL_GAP
         if tracks.solve is not None:
             self._optimal.append(optimal)
         due = self._due.get(tracks.last)
-        self.totals.window(tracks, due, optimal=optimal)
+        self.totals.count_window(tracks, due, optimal=optimal)
         if due is not None and tracks.solved_at > 0:
             self._delays.append(tracks.solved_at - due)
 

@@ -46,11 +46,11 @@ class DelayMeter:
         self._live_end = 0
         """The first pulse without a live decision."""
 
-    def decided(self, mode: DelayMode, first: int) -> None:
+    def measure_decision(self, mode: DelayMode, first: int) -> None:
         """Measure a GOP that is about to be sent whole."""
         self._measure(mode, first)
 
-    def decided_live(self, decision: ModeDecision) -> None:
+    def measure_live_decision(self, decision: ModeDecision) -> None:
         """Measure the frames that were waiting for their decision."""
         self._live_end = decision.first + decision.frames
         for buffer in self._buffers:
@@ -58,7 +58,7 @@ class DelayMeter:
                 if buffer.has(pulse):
                     self._measure(DelayMode.LIVE, pulse)
 
-    def arrived(self, pulse: int) -> None:
+    def measure_arrival(self, pulse: int) -> None:
         """Measure a frame that has arrived."""
         if pulse < self._live_end:
             self._measure(DelayMode.LIVE, pulse)

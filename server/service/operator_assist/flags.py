@@ -128,7 +128,7 @@ class FlagQueue:
             (flag for flag in self._ended if gone.isdisjoint(flag.objects)), maxlen=_MAX_ENDED
         )
 
-    def pointed(self, number: int, camera: str, pulses: Collection[int]) -> list[int]:
+    def record_pointing(self, number: int, camera: str, pulses: Collection[int]) -> list[int]:
         """Record that the operator pointed at a person; return the flags that this responds to."""
         flags = [flag for flag in self._open.values() if number in flag.objects and camera in flag.cameras]
         for flag in flags:

@@ -84,7 +84,7 @@ class OperatorAssist:
             return 0, []
         self._send(camera, msgspec.msgpack.encode(corrections))
         self.corrections_sent += len(corrections.corrections)
-        return len(corrections.corrections), self.flags.pointed(
+        return len(corrections.corrections), self.flags.record_pointing(
             number, camera, [correction.pulse for correction in corrections.corrections]
         )
 

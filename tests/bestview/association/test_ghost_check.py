@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from bestview import IdentityRegistry, IdentitySettings, TrackUpdate
-from bestview.association.ghost_check import fully_detectable
+from bestview.association.ghost_check import in_full_view
 from fakes.bestview.identity_scenes import (
     CALIBRATED,
     STRIDE,
@@ -87,9 +87,7 @@ def test_a_person_gone_before_confirmation_gets_no_id() -> None:
 def test_full_view_means_inside_the_picture_and_large_enough(x: float, y: float) -> None:
     names = list(VIEWS)
     ground = np.array([CALIBRATED[name] for name in names], dtype=np.float64)
-    visible = fully_detectable(
-        ground, np.full((3, 2), (WIDE, HIGH), dtype=np.float64), np.array([x, y]), TALL
-    )
+    visible = in_full_view(ground, np.full((3, 2), (WIDE, HIGH), dtype=np.float64), np.array([x, y]), TALL)
     for name, seen in zip(names, visible, strict=True):
         far = float((VIEWS[name] @ (x, y, 1.0))[2])
         assume(abs(far) > 0.01)
@@ -113,7 +111,7 @@ def margins(person: NDArray[np.float64]) -> list[float]:
 
 def test_a_plan_view_without_horizon_counts_too() -> None:
     plan = np.diag([0.02, 0.02, 1.0])
-    visible = fully_detectable(plan[None], np.array([[640.0, 480.0]]), np.array([6.0, 6.0]), 1.75)
+    visible = in_full_view(plan[None], np.array([[640.0, 480.0]]), np.array([6.0, 6.0]), 1.75)
     assert visible.tolist() == [True]
 
 

@@ -20,7 +20,7 @@ from server.supervisor.exposure_checks import (
     check_pulses,
     check_rtsp,
     check_viewers,
-    is_loopback,
+    is_local_host,
 )
 from server.system.errors import UserError
 
@@ -42,7 +42,7 @@ OUTSIDE = "0.0.0.0"  # noqa: S104 — what the tests are about
     ],
 )
 def test_loopback_hosts_are_recognized(host: str, expected: bool) -> None:
-    assert is_loopback(host) == expected
+    assert is_local_host(host) == expected
 
 
 def test_the_defaults_are_reachable_from_this_machine_only() -> None:
@@ -141,7 +141,7 @@ def test_encrypted_pulses_with_users_may_be_exposed() -> None:
 
 def test_the_secure_example_needs_tokens_and_passwords() -> None:
     config = load_config(CONFIGS / "secure.yaml")
-    assert not is_loopback(config.http.host)
+    assert not is_local_host(config.http.host)
     assert not config.access.open_to_all
     assert not config.access.trusted_network
     assert config.sync.users == CONFIGS / "secret" / "sync.users"

@@ -21,7 +21,7 @@ def test_the_synchronization_error_is_of_recent_frames(errors: list[float]) -> N
     measured = CameraMetrics()
     assert measured.sync_error is None
     for pulse, late in enumerate(errors):
-        measured.frame(head(pulse, late, due=0.0))
+        measured.measure_frame(head(pulse, late, due=0.0))
     last = sorted(errors[-250:])
     spread = measured.sync_error
     assert spread is not None
@@ -32,10 +32,10 @@ def test_the_synchronization_error_is_of_recent_frames(errors: list[float]) -> N
 def test_the_tracking_delay_counts_from_the_pulse_of_the_last_frame() -> None:
     measured = CameraMetrics()
     message = camera_tracks("c0", 0, {1: SMALL}, solved_at=100.5)
-    measured.window(message)  # of a missed frame
+    measured.measure_window(message)  # of a missed frame
     assert measured.tracking_delay is None
-    measured.frame(head(message.last, 0.1))
-    measured.window(message)
+    measured.measure_frame(head(message.last, 0.1))
+    measured.measure_window(message)
     assert measured.tracking_delay == RecentSeconds(0.5, 0.5)
     assert measured.size == message.size
 
@@ -45,14 +45,14 @@ def test_a_window_is_optimal_if_its_gap_is_zero(gaps: list[float], share: float 
     measured = CameraMetrics()
     for gap in gaps:
         solve = SolverReport(objective=-4.0, bound=-4.0, gap=gap, integral=False, rounds=1)
-        measured.window(msgspec.structs.replace(camera_tracks("c0", 0, {}), solve=solve))
-    measured.window(camera_tracks("c0", 1, {}))  # no detection, nothing solved
+        measured.measure_window(msgspec.structs.replace(camera_tracks("c0", 0, {}), solve=solve))
+    measured.measure_window(camera_tracks("c0", 1, {}))  # no detection, nothing solved
     assert (measured.optimal, measured.recent_solved_windows) == (share, len(gaps))
 
 
 def test_a_new_run_resets_measurements_but_not_the_last_problem() -> None:
     measured = CameraMetrics(now=lambda: 7.0)
-    measured.frame(head(0, 0.1))
+    measured.measure_frame(head(0, 0.1))
     measured.record_problem("it went\nwrong")
     measured.reset_recent()
     assert measured.sync_error is None

@@ -75,13 +75,13 @@ def test_events_of_other_reasons_are_not_flagged() -> None:
 def test_a_flag_is_answered_once_the_failure_has_passed() -> None:
     recorder = FlagRecorder()
     recorder.step(10, risk_event(7, 9, pulse=40))
-    assert recorder.flags.pointed(9, "c0", [30, 31]) == [1]
-    assert recorder.flags.pointed(9, "c0", [40, 41]) == [1]
-    assert recorder.flags.pointed(9, "c1", [60]) == [], "not a camera of the flag"
+    assert recorder.flags.record_pointing(9, "c0", [30, 31]) == [1]
+    assert recorder.flags.record_pointing(9, "c0", [40, 41]) == [1]
+    assert recorder.flags.record_pointing(9, "c1", [60]) == [], "not a camera of the flag"
     assert recorder.flags.open[0].state == "followed"
-    assert recorder.flags.pointed(9, "c0", [49, 50]) == [1]
+    assert recorder.flags.record_pointing(9, "c0", [49, 50]) == [1]
     assert recorder.states == [(1, "raised"), (1, "followed"), (1, "answered")]
-    assert recorder.flags.pointed(9, "c0", [51]) == []
+    assert recorder.flags.record_pointing(9, "c0", [51]) == []
     assert recorder.flags.open == []
     assert [flag.state for flag in recorder.flags.ended] == ["answered"]
 
@@ -93,7 +93,7 @@ def test_a_flag_not_pointed_at_to_the_end_expires(pointed: Sequence[int], ends: 
     recorder = FlagRecorder(answer_s=2.0)
     recorder.step(10, risk_event(7, 9, pulse=40))
     if pointed:
-        recorder.flags.pointed(7, "c0", pointed)
+        recorder.flags.record_pointing(7, "c0", pointed)
     recorder.step(90)
     assert len(recorder.flags.open) == 1
     recorder.step(91)
@@ -104,7 +104,7 @@ def test_a_flag_not_pointed_at_to_the_end_expires(pointed: Sequence[int], ends: 
 def test_an_answered_failure_is_not_flagged_again() -> None:
     recorder = FlagRecorder(per_minute=10, answer_s=2.0)
     recorder.step(10, risk_event(7, 9, pulse=40))
-    recorder.flags.pointed(7, "c0", [60])
+    recorder.flags.record_pointing(7, "c0", [60])
     recorder.step(45, risk_event(7, 9, pulse=44))
     assert recorder.flags.open == []
     recorder.step(115, risk_event(7, 9, pulse=130))
@@ -118,7 +118,7 @@ def test_flags_use_the_current_numbers_of_merged_people() -> None:
     recorder.step(15, risk_event(4, 7, pulse=40))
     assert [flag.objects for flag in recorder.flags.open] == [[7, 4]]
     assert recorder.flags.counts["raised"] == 1
-    assert recorder.flags.pointed(4, "c0", [50]) == [1]
+    assert recorder.flags.record_pointing(4, "c0", [50]) == [1]
 
 
 @given(
