@@ -360,11 +360,15 @@ async def test_a_tile_says_that_a_camera_waits_why_and_until_when(browser: Brows
         tile = page.locator(".camera-tile").first
         await expect(tile.locator(".state")).to_have_text("Live")
         served.service.ingest.set_present(ZenohKeys("hall").camera(A, "alive"), is_present=False)
-        served.service.ingest.receive_unavailable(unavailable(A, "changed", 3600.0, "10.0.0.9: its images are small"))
+        served.service.ingest.receive_unavailable(
+            unavailable(A, "changed", 3600.0, "10.0.0.9: its images are small")
+        )
         await expect(tile.locator(".state")).to_have_text("Waiting")
         line = r"Will be opened again at \d.*: 10\.0\.0\.9: its images are small"
         await expect(tile.locator(".last-error")).to_have_text(re.compile(line))
-        served.service.ingest.receive_unavailable(unavailable(A, "changed", 0.0, "10.0.0.9: its images are small"))
+        served.service.ingest.receive_unavailable(
+            unavailable(A, "changed", 0.0, "10.0.0.9: its images are small")
+        )
         await expect(tile.locator(".last-error")).to_have_text("10.0.0.9: its images are small")
         await expect(tile.locator(".state")).to_have_text("Gone")
         served.service.connect_cameras(A)
