@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from server.config.password_file import read_users
@@ -36,6 +37,16 @@ def access_control_of(config: Config) -> dict[str, Any] | None:
     return build_access_control(config.site.name, config.site_camera_ids, config.audio_sender, users)
 
 
+@dataclass(frozen=True, slots=True)
+class _Subject:
+    """Some users, the rules that hold for them alone, and the names of further ones that hold for them."""
+
+    name: str
+    users: Sequence[str]
+    own_rules: Sequence[Mapping[str, Any]] = ()
+    shared_rules: Sequence[str] = ()
+
+
 def build_access_control(
     site: str, cameras: Sequence[str], audio_sender: str | None, users: Sequence[str]
 ) -> dict[str, Any]:
@@ -47,69 +58,83 @@ def build_access_control(
     receives what it is told about people. Any other user may subscribe to everything and send nothing.
     """
     keys = ZenohKeys(site)
-    everything = f"myview/{site}/**"
+    services = [bestview_client_name(index) for index in range(_MAX_SERVICES)]
+    others = [user for user in users if user not in {*cameras, *services}]
+    sites = [user for user in others if is_site_user(user)]
+    listeners = [user for user in others if user not in sites]
+    shared = _rules_of_all_cameras(keys)
+    camera_subjects = [
+        _camera(
+            keys, camera, sends_audio=camera == audio_sender, shared_rules=[rule["id"] for rule in shared]
+        )
+        for camera in cameras
+    ]
+    subjects = [
+        _services(keys, services),
+        *([_listeners(keys, listeners)] if listeners else []),
+        *([_sites(keys, sites)] if sites else []),
+        *camera_subjects,
+    ]
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": [*shared, *(rule for subject in subjects for rule in subject.own_rules)],
+        "subjects": [{"id": subject.name, "usernames": subject.users} for subject in subjects],
+        "policies": [
+            {
+                "rules": [*(rule["id"] for rule in subject.own_rules), *subject.shared_rules],
+                "subjects": [subject.name],
+            }
+            for subject in subjects
+        ],
+    }
+
+
+def _services(keys: ZenohKeys, users: Sequence[str]) -> _Subject:
+    rule = _rule("services", "both", [*_SEND, *_SUBSCRIBE, *_EXCHANGE], [keys.everything])
+    return _Subject("services", users, [rule])
+
+
+def _listeners(keys: ZenohKeys, users: Sequence[str]) -> _Subject:
+    rules = [
+        _rule("may subscribe to all", "ingress", _SUBSCRIBE, [keys.everything]),
+        _rule("receives all", "egress", _FORWARD, [keys.everything]),
+    ]
+    return _Subject("listeners", users, rules)
+
+
+def _sites(keys: ZenohKeys, users: Sequence[str]) -> _Subject:
+    people = [keys.bestview("**/people")]
+    rules = [
+        _rule("may subscribe to people", "ingress", ["declare_subscriber"], people),
+        _rule("receives people", "egress", ["put"], people),
+    ]
+    return _Subject("sites", users, rules)
+
+
+def _camera(keys: ZenohKeys, camera: str, *, sends_audio: bool, shared_rules: Sequence[str]) -> _Subject:
+    name = f"camera {camera}"
+    commands = [keys.camera(camera, command) for command in _COMMANDS]
+    rules = [
+        _rule(name, "ingress", _SEND, [keys.camera(camera, "**"), *([keys.sound] if sends_audio else [])]),
+        _rule(f"{name} may subscribe to commands", "ingress", ["declare_subscriber"], commands),
+        _rule(f"{name} receives commands", "egress", ["put"], commands),
+    ]
+    return _Subject(name, [camera], rules, shared_rules)
+
+
+def _rules_of_all_cameras(keys: ZenohKeys) -> list[dict[str, Any]]:
     detections = [keys.camera("*", "detections")]
     alive = [keys.camera("*", "peer_listener"), keys.bestview("**")]
-    rules = [
-        _rule("services", "both", [*_SEND, *_SUBSCRIBE, *_EXCHANGE], [everything]),
-        _rule("may subscribe to all", "ingress", _SUBSCRIBE, [everything]),
-        _rule("receives all", "egress", _FORWARD, [everything]),
+    commands = [keys.camera("*", command) for command in _COMMANDS]
+    return [
+        _rule("may not command cameras", "ingress", ["put", "delete"], commands, "deny"),
         _rule("may subscribe to peers", "ingress", ["declare_subscriber"], detections),
         _rule("receives peers", "egress", ["put", "delete"], detections),
         _rule("may watch peers and services", "ingress", _WATCH, alive),
         _rule("watches peers and services", "egress", ["liveliness_token"], alive),
-        _rule("learns subscriptions", "egress", ["declare_subscriber"], [everything]),
-        _rule(
-            "may not command cameras",
-            "ingress",
-            ["put", "delete"],
-            [keys.camera("*", command) for command in _COMMANDS],
-        )
-        | {"permission": "deny"},
+        _rule("learns subscriptions", "egress", ["declare_subscriber"], [keys.everything]),
     ]
-    service_names = [bestview_client_name(index) for index in range(_MAX_SERVICES)]
-    listeners = [user for user in users if user not in {*cameras, *service_names}]
-    sites = [user for user in listeners if is_site_user(user)]
-    listeners = [user for user in listeners if user not in sites]
-    subjects = [{"id": "services", "usernames": service_names}]
-    policies = [{"rules": ["services"], "subjects": ["services"]}]
-    if listeners:
-        subjects.append({"id": "listeners", "usernames": listeners})
-        policies.append({"rules": ["may subscribe to all", "receives all"], "subjects": ["listeners"]})
-    if sites:
-        people = [keys.bestview("**/people")]
-        rules.append(_rule("may subscribe to people", "ingress", ["declare_subscriber"], people))
-        rules.append(_rule("receives people", "egress", ["put"], people))
-        subjects.append({"id": "sites", "usernames": sites})
-        policies.append({"rules": ["may subscribe to people", "receives people"], "subjects": ["sites"]})
-    for camera in cameras:
-        publish_keys = [keys.camera(camera, "**"), *([keys.sound] if camera == audio_sender else [])]
-        rules.append(_rule(f"camera {camera}", "ingress", _SEND, publish_keys))
-        commands = [keys.camera(camera, command) for command in _COMMANDS]
-        rules.append(
-            _rule(f"camera {camera} may subscribe to commands", "ingress", ["declare_subscriber"], commands)
-        )
-        rules.append(_rule(f"camera {camera} receives commands", "egress", ["put"], commands))
-        subjects.append({"id": f"camera {camera}", "usernames": [camera]})
-        camera_rules = [
-            f"camera {camera}{suffix}" for suffix in ("", " may subscribe to commands", " receives commands")
-        ]
-        camera_rules += [
-            "may not command cameras",
-            "may subscribe to peers",
-            "receives peers",
-            "may watch peers and services",
-            "watches peers and services",
-            "learns subscriptions",
-        ]
-        policies.append({"rules": camera_rules, "subjects": [f"camera {camera}"]})
-    return {
-        "enabled": True,
-        "default_permission": "deny",
-        "rules": rules,
-        "subjects": subjects,
-        "policies": policies,
-    }
 
 
 def _rule(

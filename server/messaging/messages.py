@@ -301,6 +301,11 @@ class ZenohKeys:
         """The key of the site's audio."""
         return f"myview/{self.site}/sound"
 
+    @property
+    def everything(self) -> str:
+        """All keys of the site."""
+        return f"myview/{self.site}/**"
+
     def bestview(self, topic: str, index: int = 0) -> str:
         """Return a key of the best-view service with this index."""
         return f"myview/{self.site}/bestview/{f'{index}/' if index else ''}{topic}"
