@@ -23,12 +23,12 @@ from server.camera.operator_corrections import merge_correction
 from server.camera.passthrough import PassthroughEncoder, open_passthrough
 from server.camera.peers.cross_view_scorer import CrossViewScorer, PeerDetections
 from server.camera.sharpness import SharpnessMemory
-from server.camera.shown_view import ShownView
 from server.camera.sources import FrameSource, Image, open_source
 from server.camera.sources.live_stream import LiveStream
 from server.camera.substream.opening import open_tracked_pictures
 from server.camera.track_messages import TrackMessageBuilder
 from server.camera.tracker_setup import set_up_tracker
+from server.camera.view_monitor import ViewMonitor
 from server.config.sections import CameraSettings
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
@@ -55,7 +55,7 @@ class DetectedFrame:
         image: in which people were detected, at the scale of the tracked pictures; None: there was none.
         detections: empty where detection did not run.
         has_detection: whether detection ran.
-        shows_its_place: whether detections are where the homography says: the camera is not turned away.
+        is_located: whether detections are where the homography says: the camera is not turned away.
         message: the detections as sent to the peer cameras; None without peers.
         motion: how the picture has moved since the camera was calibrated, pixels of the site's image.
         skipped: whether load shedding left the frame out.
@@ -66,7 +66,7 @@ class DetectedFrame:
     image: Image | None
     detections: Detections
     has_detection: bool
-    shows_its_place: bool
+    is_located: bool
     message: FrameDetections | None
     motion: PictureMotion | None = None
     skipped: bool = False
@@ -147,7 +147,7 @@ class CameraPipeline:
             tracker, self._detector.appearance_bins, config.window.stride
         )
         self._messages = TrackMessageBuilder(camera_id, boot, self.source.size, config.window.stride)
-        self.view = ShownView(site.fps, self._detector, self.tracked.scale)
+        self.view = ViewMonitor(site.fps, self._detector, self.tracked.scale)
         """What the camera shows."""
         self._sharpness = SharpnessMemory() if config.view.quality.sharpness > 0 else None
         self.cross_view = (
@@ -223,7 +223,7 @@ class CameraPipeline:
             boxes = self.tracked.scale.boxes_to_site(detections.boxes)
             detections = Detections(boxes, detections.scores, detections.histograms)
             has_detection = not self._detector.warming_up
-        shown, motion = self.view.shows_its_place, self.view.motion
+        shown, motion = self.view.is_located, self.view.motion
         message = (
             self.cross_view.build_message(
                 pulse, detections if has_detection and shown else None, motion, self.view.hidden
@@ -293,7 +293,7 @@ class CameraPipeline:
         strongest = most_confident(frame.detections)
         if self._raw_detections is not None:
             self._raw_detections.add(frame.pulse, strongest)
-        if self._observations is not None and frame.shows_its_place:
+        if self._observations is not None and frame.is_located:
             self._observations.add(frame.pulse, strongest, frame.motion)
 
     def _add_picture(self, tracks: CameraTracks, image: Image | None) -> CameraTracks:

@@ -12,9 +12,9 @@ import pytest
 
 from server.camera.picture_reports import KnockLog, noticeable_motion
 from server.camera.pipeline import CameraPipeline
-from server.camera.shown_view import ShownView
 from server.camera.sources import Image, SourceEndedError
 from server.camera.substream.picture_scale import PictureScale
+from server.camera.view_monitor import ViewMonitor
 from server.cli.render.camera_workers import run_camera
 from server.config.loader import build_config
 from tracking.boxes import areas
@@ -114,7 +114,7 @@ def test_a_turned_camera_is_located_and_its_picture_is_as_good_as_before() -> No
     }
     camera = TurnedCamera()
     pipeline = CameraPipeline(build_config(content, where="site", folder=Path()), "c0", source=camera)
-    assert pipeline.view.shows_its_place
+    assert pipeline.view.is_located
     batches = list(run_camera(pipeline, "c0"))
     found = batches[-1].tracks.motion
     assert found is not None
@@ -122,26 +122,26 @@ def test_a_turned_camera_is_located_and_its_picture_is_as_good_as_before() -> No
     there, true = (matrix @ at for matrix in (np.array(found.matrix), camera.turned))
     np.testing.assert_allclose(there[:2] / there[2], true[:2] / true[2], atol=3.0)
     assert batches[-1].tracks.condition == "clear"
-    assert pipeline.view.shows_its_place
+    assert pipeline.view.is_located
 
 
 @pytest.mark.parametrize("detector", [HogDetector(), BackgroundDetector()])
-def test_a_camera_that_is_turned_away_shows_its_place_only_once_it_is_located(
+def test_a_camera_that_is_turned_away_is_not_located_before_its_view_is_found(
     detector: Detector, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A detector may have no background, or one that still explains most of the picture."""
-    view, picture = ShownView(10.0, detector, SCALE), KnockedCamera().take(0)
+    view, picture = ViewMonitor(10.0, detector, SCALE), KnockedCamera().take(0)
     view.observe(picture, 0)
-    assert view.shows_its_place
+    assert view.is_located
     monkeypatch.setattr(view.monitor, "shows_another_scene", True)
     view.observe(picture, 1)
-    assert not view.shows_its_place
+    assert not view.is_located
 
 
-def test_a_camera_whose_lens_is_covered_in_part_shows_its_place_in_the_rest() -> None:
+def test_a_camera_whose_lens_is_covered_in_part_is_located_by_the_rest() -> None:
     room, random = KnockedCamera().take(0), np.random.default_rng(0)
     detector = BackgroundDetector()
-    view = ShownView(10.0, detector, SCALE)
+    view = ViewMonitor(10.0, detector, SCALE)
     shares, reported = [], []
     for frame in range(110):
         picture = np.clip(room + 2.0 * random.standard_normal(room.shape), 0, 255).astype(np.uint8)
@@ -152,7 +152,7 @@ def test_a_camera_whose_lens_is_covered_in_part_shows_its_place_in_the_rest() ->
         detector.detect(picture)
         view.observe(picture, frame)
         shares.append(areas(view.hidden).sum() / (SIZE[0] * SIZE[1]))
-        assert view.shows_its_place
+        assert view.is_located
         reported.append(view.covered_share)
         if frame == 75:
             ignored = 1.0 - np.count_nonzero(detector.grid.visible) / detector.grid.visible.size
@@ -165,7 +165,7 @@ def test_a_camera_whose_lens_is_covered_in_part_shows_its_place_in_the_rest() ->
 
 def test_a_partly_covered_lens_that_goes_dark_shows_nothing() -> None:
     room, random = KnockedCamera().take(0), np.random.default_rng(0)
-    view, shares = ShownView(5.0, HogDetector(), SCALE), []
+    view, shares = ViewMonitor(5.0, HogDetector(), SCALE), []
     for frame in range(80):
         picture = np.clip(room + 2.0 * random.standard_normal(room.shape), 0, 255).astype(np.uint8)
         if frame >= 25:
@@ -182,14 +182,14 @@ def test_a_view_that_is_lost_for_long_without_a_turn_lies_where_it_lay() -> None
     """A camera that was turned, and then changed to infrared."""
     turned = np.array([[1.0, 0.0, 60.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     detector, room = BackgroundDetector(), KnockedCamera()
-    view = ShownView(10.0, detector, SCALE)
+    view = ViewMonitor(10.0, detector, SCALE)
     motions, shown = [], []
     for frame in range(100):
         moved = np.eye(3) if frame < 20 else turned if frame < 50 else None
         with patch.object(BackgroundDetector, "camera_motion", moved):
             view.observe(room.take(0), frame)
         motions.append(view.motion)
-        shown.append(view.shows_its_place)
+        shown.append(view.is_located)
     assert motions[10] is None
     assert motions[30] is not None
     assert motions[-1] == motions[30]

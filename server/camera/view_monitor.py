@@ -1,4 +1,4 @@
-"""What a camera shows, and where that lies since the camera was knocked or turned."""
+"""View monitor: what is wrong with a camera's picture, and where it lies since a knock or a turn."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SEEK_S = 3.0
 """Seconds in which a view whose background is learned anew is located if it can be."""
 
 
-class ShownView:
+class ViewMonitor:
     """Watches a camera's pictures.
 
     Args:
@@ -105,8 +105,8 @@ class ShownView:
         return self.monitor.since
 
     @property
-    def shows_its_place(self) -> bool:
-        """Whether what is seen is now, and where the homography, moved by `motion`, says.
+    def is_located(self) -> bool:
+        """Whether the picture is of now, and lies where the homography, moved by `motion`, says.
 
         A view that could not be located for a while is the one before in another light, unless the camera
         seems to be turned away.
