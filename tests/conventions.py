@@ -18,6 +18,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PRODUCT = ("camsync", "tracking", "bestview", "synthetic", "server", "client")
 _SOURCES = (".py", ".js")
 _PUBLIC_CLASS = re.compile(r"^class ([^_\W]\w*)", re.MULTILINE)
+_SOURCE_NAME = re.compile(r"[\w-]+\.(?:py|js)\b")
 _WORD = re.compile(r"[^\W\d_]+(?:['-][^\W\d_]+)*")
 
 
@@ -104,6 +105,20 @@ def docstrings_beginning_with(words: Iterable[str], *folders: str) -> list[str]:
         for path, tree in parsed(*folders, having=rf"""[\"'][\s\\]*{first}""")
         for node in ast.walk(tree)
         if isinstance(node, documented) and re.match(first, ast.get_docstring(node) or "")
+    ]
+
+
+def missing_sources_in_documents() -> list[str]:
+    """Return where Markdown files name a module or a script that does not exist."""
+    paths = tracked()
+    known = {path.name for path in paths}
+    return [
+        f"{path}:{number}: {name}"
+        for path in paths
+        if path.suffix == ".md"
+        for number, line in enumerate((ROOT / path).read_text(encoding="utf-8").splitlines(), start=1)
+        for name in _SOURCE_NAME.findall(line)
+        if name not in known
     ]
 
 

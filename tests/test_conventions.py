@@ -8,6 +8,7 @@ from conventions import (
     PRODUCT,
     docstrings_beginning_with,
     flat_folders,
+    missing_sources_in_documents,
     rooms,
     shared_class_names,
     words_of,
@@ -38,6 +39,10 @@ def test_docstrings_begin_with_plain_verbs() -> None:
 
 def test_names_in_docstrings_exist() -> None:
     assert stale_names() == []
+
+
+def test_modules_in_documents_exist() -> None:
+    assert missing_sources_in_documents() == []
 
 
 @pytest.mark.parametrize("document", MAX_WORDS)
