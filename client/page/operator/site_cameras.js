@@ -2,7 +2,7 @@
 
 import { requestOperator, requestTrial } from '../shared/requests.js';
 import { CameraSearch } from '../shared/camera_search.js';
-import { element, make, setText } from '../shared/dom.js';
+import { element, make, onClick, setChildren, setText } from '../shared/dom.js';
 
 /** @import {CameraTrial} from '../shared/api_types.js' */
 /** @import {ShowWait} from '../shared/requests.js' */
@@ -17,6 +17,8 @@ export class SiteCameras {
   #instead = element('add-instead'); // the camera that gets the address; empty: a new one
   /** @type {HTMLInputElement} */
   #name = element('add-name');
+  /** @type {Map<string, HTMLElement>} by camera, address and substream */
+  #items = new Map();
 
   /**
    * @param {ShowError} showError
@@ -43,12 +45,13 @@ export class SiteCameras {
    * @returns {Promise<string>} what has become of it
    */
   async #tryCamera(trial, showWait) {
-    const camera = this.#instead.value;
-    const wanted = { ...trial, name: this.#name.value.trim() || trial.name, camera };
+    const [camera, name] = [this.#instead.value, this.#name.value];
+    const wanted = { ...trial, name: name.trim() || trial.name, camera };
     const { cameras, note } = await requestTrial('site_cameras', wanted, showWait);
     this.#show(cameras);
-    this.#name.value = this.#instead.value = '';
-    this.#name.disabled = false;
+    if (this.#name.value === name) this.#name.value = ''; // else another one was entered meanwhile
+    if (this.#instead.value === camera) this.#instead.value = '';
+    this.#name.disabled = this.#instead.value !== '';
     await this.fileChanged();
     return camera ? `is the address of ${camera} now${note && `; ${note}`}` : 'was added';
   }
@@ -58,7 +61,9 @@ export class SiteCameras {
     const chosen = this.#instead.value;
     const options = cameras.map(({ camera }) => make('option', { value: camera, textContent: camera, selected: camera === chosen }));
     this.#instead.replaceChildren(make('option', { value: '', textContent: 'a new camera' }), ...options);
-    element('site-cameras').replaceChildren(...cameras.map((camera) => this.#item(camera)));
+    const keyed = cameras.map((camera) => /** @type {const} */ ([JSON.stringify(camera), camera]));
+    this.#items = new Map(keyed.map(([key, camera]) => [key, this.#items.get(key) ?? this.#item(camera)]));
+    setChildren(element('site-cameras'), [...this.#items.values()]);
   }
 
   /** @param {SiteCamera} camera */
@@ -69,7 +74,7 @@ export class SiteCameras {
     rename.setAttribute('aria-label', `Rename camera ${camera}`);
     const remove = make('button', { type: 'button', textContent: 'Remove' });
     remove.setAttribute('aria-label', `Remove camera ${camera}`);
-    remove.addEventListener('click', () => void this.#change('DELETE', { camera }));
+    onClick(remove, () => this.#change('DELETE', { camera }));
     const form = make('form', {}, field, rename, remove);
     form.addEventListener('submit', (event) => {
       event.preventDefault();

@@ -1,6 +1,6 @@
 /** Tiles of the cameras that were tried: picture, name, removal. */
 
-import { element, make } from '../shared/dom.js';
+import { element, make, onClick, setChildren } from '../shared/dom.js';
 import { requestOperator } from '../shared/requests.js';
 
 /** @import {AddedCamera, SetupState} from './api_types.js' */
@@ -22,7 +22,7 @@ export class AddedCameras {
   show(cameras) {
     const tiles = new Map(cameras.map((camera) => [camera.key, this.#tiles.get(camera.key) ?? this.#tile(camera)]));
     this.#tiles = tiles;
-    element('added').replaceChildren(...tiles.values());
+    setChildren(element('added'), [...tiles.values()]);
     element('no-cameras').hidden = cameras.length > 0;
   }
 
@@ -39,7 +39,7 @@ export class AddedCameras {
     });
     const remove = make('button', { type: 'button', textContent: 'Remove' });
     remove.setAttribute('aria-label', `Remove the camera at ${address}`);
-    remove.addEventListener('click', () => void this.#request(`setup/cameras/${key}`, 'DELETE'));
+    onClick(remove, async () => void (await this.#request(`setup/cameras/${key}`, 'DELETE')));
     return make(
       'li',
       { className: 'camera-tile added-camera' },

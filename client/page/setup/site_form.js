@@ -52,6 +52,7 @@ export class SiteForm {
     } catch (error) {
       this.showError(error);
       this.#start.disabled = false;
+      this.#start.focus();
     }
   }
 }

@@ -1,7 +1,8 @@
 /** Cameras found in the network, their streams, and addresses: what is chosen is tried. */
 
-import { element, make, setText } from './dom.js';
+import { element, make, onClick, setChildren, setText } from './dom.js';
 import { HttpError, requestOperator, requestTrial } from './requests.js';
+import { TrialLines } from './trial_lines.js';
 
 /** @import {ShowWait} from './requests.js' */
 /** @import {CameraTrial, OfferedStream, OfferedStreams, SearchResult, SearchedCamera} from './api_types.js' */
@@ -15,7 +16,9 @@ export class CameraSearch {
   #state = make('span', { id: 'search-state', className: 'quiet' });
   #address = addressField('address', 'rtsp://10.0.0.11/stream1');
   #substream = addressField('substream-address', 'none: people are tracked in the same');
-  #trial = make('p', { id: 'trial-state', className: 'message' });
+  #trials = new TrialLines('Trials of addresses');
+  /** @type {Map<string, {item: HTMLElement, trials: TrialLines}>} by address and port */
+  #found = new Map();
   #hint = '';
 
   /**
@@ -30,9 +33,9 @@ export class CameraSearch {
     found.setAttribute('aria-label', 'Cameras found');
     const search = make('p', { className: 'buttons' }, this.#search, ' ', this.#state);
     place.prepend(login, make('p', { className: 'quiet', textContent: 'Used for every camera below; leave empty where there is none.' }));
-    place.append(search, found, address, this.#trial);
-    for (const state of [this.#state, this.#trial]) state.setAttribute('role', 'status');
-    this.#search.addEventListener('click', () => void this.run());
+    place.append(search, found, address, this.#trials.list);
+    this.#state.setAttribute('role', 'status');
+    onClick(this.#search, () => this.run());
   }
 
   #loginForm() {
@@ -48,27 +51,39 @@ export class CameraSearch {
     form.append(...parts, make('button', { type: 'submit', textContent: 'Try' }));
     form.addEventListener('submit', async (event) => {
       event.preventDefault();
-      const trial = { address: this.#address.value, substream_address: this.#substream.value, ...this.#login };
-      if (await this.#try(this.#address.value, trial)) this.#address.value = this.#substream.value = '';
+      const [address, substream] = [this.#address.value, this.#substream.value];
+      const works = await this.#try(address, { address, substream_address: substream, ...this.#login }, this.#trials);
+      if (works && this.#address.value === address) this.#address.value = ''; // else another one was entered meanwhile
+      if (works && this.#substream.value === substream) this.#substream.value = '';
     });
     return form;
   }
 
   /** Search the network, and list the cameras that answer. */
   async run() {
-    this.#search.disabled = true;
     setText(this.#state, 'Searching…');
     try {
       /** @type {SearchResult} */
       const { cameras, hint } = await requestOperator('setup/search', 'POST', undefined, SEARCH_TIMEOUT_MS);
       this.#hint = hint;
-      element('found').replaceChildren(...cameras.map((camera) => this.#foundItem(camera)));
+      this.#list(cameras);
       const count = cameras.length ? `${cameras.length} found.` : 'None found by ONVIF. Enter their addresses.';
       setText(this.#state, cameras.length && hint ? `${count} ${hint}.` : count);
     } catch (error) {
-      this.#fail(this.#state, error);
+      setText(this.#state, this.#explain(error));
     }
-    this.#search.disabled = false;
+  }
+
+  /**
+   * List cameras that were found, and those of earlier searches that were tried: one may be tried now.
+   *
+   * @param {SearchedCamera[]} cameras
+   */
+  #list(cameras) {
+    const found = new Map(cameras.map((camera) => [`${camera.host}:${camera.port}`, camera]));
+    for (const [key, { trials }] of this.#found) if (!found.has(key) && trials.empty) this.#found.delete(key);
+    for (const [key, camera] of found) if (!this.#found.has(key)) this.#found.set(key, this.#foundItem(camera));
+    setChildren(element('found'), [...this.#found.values()].map(({ item }) => item));
   }
 
   /** Forget the login, when the page is left. */
@@ -84,15 +99,17 @@ export class CameraSearch {
   #foundItem(camera) {
     const label = [camera.host, camera.name, camera.hardware && `(${camera.hardware})`].filter(Boolean).join(' ');
     const streams = make('p', { className: 'buttons' });
+    const trials = new TrialLines(`Trials of ${camera.name || camera.host}`);
     const message = make('p', { className: 'quiet' });
     message.setAttribute('role', 'status');
     const ask = make('button', { type: 'button', textContent: this.#hint ? 'Enter its address' : 'Show its streams' });
     ask.setAttribute('aria-label', `${ask.textContent}: ${label}`);
-    ask.addEventListener('click', () => {
+    onClick(ask, async () => {
       if (this.#hint) this.#proposeAddress(camera.host);
-      else void this.#askStreams(camera, ask, streams, message);
+      else await this.#askStreams(camera, streams, message, trials);
     });
-    return make('li', {}, make('p', { className: 'buttons' }, make('span', { textContent: label }), ask), streams, message);
+    const head = make('p', { className: 'buttons' }, make('span', { textContent: label }), ask);
+    return { item: make('li', {}, head, streams, message, trials.list), trials };
   }
 
   /** @param {string} host */
@@ -103,43 +120,40 @@ export class CameraSearch {
 
   /**
    * @param {SearchedCamera} camera
-   * @param {HTMLButtonElement} ask
    * @param {HTMLElement} list
    * @param {HTMLElement} message
+   * @param {TrialLines} trials
    */
-  async #askStreams(camera, ask, list, message) {
-    ask.disabled = true;
+  async #askStreams(camera, list, message, trials) {
     setText(message, 'Asking…');
     try {
       const { host, port } = camera;
       /** @type {OfferedStreams} */
       const { error, streams, source, substream } = await requestTrial('setup/streams', { host, port, ...this.#login }, (wait) => setText(message, wait || 'Asking…'));
-      setText(message, error ? `${host}: ${error}.` : '');
+      setText(message, error ? `${host}: ${error}.` : `${streams.length} ${streams.length > 1 ? 'streams' : 'stream'}.`);
       const tracked = trackedChoice(camera, streams, substream);
       const first = streams.filter(({ key }) => key === source);
       const sorted = [...first, ...streams.filter(({ key }) => key !== source)];
-      const buttons = sorted.map((stream) => this.#streamButton(camera, stream, tracked));
+      const buttons = sorted.map((stream) => this.#streamButton(camera, stream, tracked, trials));
       list.replaceChildren(...buttons, ...(streams.length > 1 ? [make('label', {}, 'People are tracked in ', tracked)] : []));
     } catch (error) {
-      this.#fail(message, error);
+      setText(message, this.#explain(error));
     }
-    ask.disabled = false;
   }
 
   /**
    * @param {SearchedCamera} camera
    * @param {OfferedStream} offered
    * @param {HTMLSelectElement} tracked
+   * @param {TrialLines} trials
    */
-  #streamButton({ host, name }, offered, tracked) {
+  #streamButton({ host, name }, offered, tracked, trials) {
     const { key, name: stream } = offered;
     const button = make('button', { type: 'button', textContent: `Try ${describeStream(offered)}` });
-    button.addEventListener('click', async () => {
-      button.disabled = true;
+    onClick(button, async () => {
       const chosen = Number(tracked.value);
       const substream = chosen && chosen !== key ? chosen : null;
-      await this.#try(`${host} ${stream}`, { stream: key, substream, name: name || host });
-      button.disabled = false;
+      await this.#try(`${host} ${stream}`, { stream: key, substream, name: name || host }, trials);
     });
     return button;
   }
@@ -147,30 +161,32 @@ export class CameraSearch {
   /**
    * @param {string} label
    * @param {CameraTrial} trial
+   * @param {TrialLines} trials
    * @returns {Promise<boolean>} whether it sends pictures
    */
-  async #try(label, trial) {
+  async #try(label, trial, trials) {
     const shown = label.replace(/\/\/[^/]*@/, '//'); // a login that was pasted with the address
-    setText(this.#trial, `Trying ${shown}…`);
+    const show = trials.begin(shown);
+    show(`Trying ${shown}…`);
     try {
-      const became = await this.tryCamera(trial, (wait) => setText(this.#trial, wait ? `${shown}: ${wait}` : `Trying ${shown}…`));
-      setText(this.#trial, `${shown} sends pictures and ${became}.`);
+      const became = await this.tryCamera(trial, (wait) => show(wait ? `${shown}: ${wait}` : `Trying ${shown}…`));
+      show(`${shown} sends pictures and ${became}.`, true);
       return true;
     } catch (error) {
-      this.#fail(this.#trial, error);
+      const why = this.#explain(error);
+      show(why.startsWith(shown) ? why : `${shown}: ${why}`, true);
       return false;
     }
   }
 
   /**
-   * Say where it was tried why something failed: the top of the page may be out of sight.
+   * Return why something failed, to say it where it was tried: the top of the page may be out of sight.
    *
-   * @param {Element} where
    * @param {unknown} error
    */
-  #fail(where, error) {
-    setText(where, error instanceof Error ? error.message : '');
+  #explain(error) {
     if (error instanceof HttpError && error.status === 401) this.showError(error);
+    return error instanceof Error ? error.message : '';
   }
 }
 

@@ -45,6 +45,34 @@ export function setText(target, text) {
 }
 
 /**
+ * Set what an element contains without touching what stays in its place: it keeps the focus and what is typed.
+ *
+ * @param {Element} target
+ * @param {Element[]} children
+ */
+export function setChildren(target, children) {
+  const wanted = new Set(children);
+  for (const child of [...target.children]) if (!wanted.has(child)) child.remove();
+  children.forEach((child, at) => {
+    if (target.children[at] !== child) target.insertBefore(child, target.children[at] ?? null);
+  });
+}
+
+/**
+ * Make a button do nothing while its work goes on. Disabled, it would lose the keyboard's focus.
+ *
+ * @param {HTMLButtonElement} button
+ * @param {() => Promise<void>} work
+ */
+export function onClick(button, work) {
+  button.addEventListener('click', async () => {
+    if (button.getAttribute('aria-disabled') === 'true') return;
+    button.setAttribute('aria-disabled', 'true');
+    await work().finally(() => button.removeAttribute('aria-disabled'));
+  });
+}
+
+/**
  * Set the lines of a list, without touching those that stay.
  *
  * @param {Element} list

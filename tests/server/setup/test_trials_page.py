@@ -1,0 +1,143 @@
+"""Several cameras are tried at once on the set-up page: none hides what became of another."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, closing, suppress
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+from playwright.async_api import Browser, Page, expect
+
+from benchmarks.common.browser import chromium
+from fakes.media.rtsp_camera import RtspCamera
+from fakes.page.accessibility import page_violations
+from fakes.page.browser import new_page
+from fakes.paths import AXE
+from fakes.programs import needs_chromium
+from fakes.service.scripted_cameras import encoded
+from fakes.setup.onvif_camera import FakeProfile, OnvifCamera, onvif_cameras
+from server.http.setup_app import serve_setup
+from server.setup.session import SetupSession
+
+pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def browser() -> AsyncIterator[Browser]:
+    async with chromium() as running:
+        yield running
+
+
+@asynccontextmanager
+async def setup_page(browser: Browser, folder: Path) -> AsyncIterator[Page]:
+    """Open the page of a set-up; what fails in the page fails the test."""
+    url = asyncio.get_running_loop().create_future()
+    serving = asyncio.create_task(serve_setup(SetupSession(folder / "site.yaml"), 0, url.set_result))
+    errors: list[str] = []
+    try:
+        page = await new_page(browser, bypass_csp=True)
+        page.on("pageerror", lambda error: errors.append(str(error)))
+        await page.goto(await url)
+        await expect(page.locator("#search-state")).not_to_have_text(re.compile("Searching|^$"))
+        yield page
+        await page.close()
+    finally:
+        serving.cancel()
+        with suppress(asyncio.CancelledError):
+            await serving
+    assert errors == []
+
+
+@asynccontextmanager
+async def silent_camera() -> AsyncIterator[tuple[str, asyncio.Event]]:
+    """Serve an RTSP camera that says nothing until the event is set, and then hangs up."""
+    ends = asyncio.Event()
+
+    async def serve(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        await ends.wait()
+        writer.close()
+
+    server = await asyncio.start_server(serve, "127.0.0.1", 0)
+    yield f"rtsp://127.0.0.1:{server.sockets[0].getsockname()[1]}/live", ends
+    ends.set()
+    server.close()
+
+
+def camera() -> RtspCamera:
+    units = encoded(0, 40)
+    return RtspCamera([units[at : at + 5] for at in range(0, 40, 5)], 12.5, live=True)
+
+
+async def try_address(page: Page, address: str) -> None:
+    await page.get_by_label("Or an address").fill(address)
+    await page.get_by_role("button", name="Try", exact=True).click()
+
+
+async def test_each_address_that_is_tried_has_a_line_of_its_own(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MYVIEW_DISCOVERY", "127.0.0.1:9")
+    with closing(camera()) as works:
+        async with silent_camera() as (silent, ends), setup_page(browser, tmp_path) as page:
+            lines = page.get_by_role("list", name="Trials of addresses").locator("li")
+            await try_address(page, silent)
+            await expect(lines).to_have_text([f"Trying {silent}…"])
+            await try_address(page, works.url)
+            added = f"{works.url} sends pictures and was added."
+            await page.get_by_label("Or an address").fill("rtsp://10.0.0.7/typed-meanwhile")
+            await expect(lines).to_have_text([f"Trying {silent}…", added])
+            name = page.get_by_label(re.compile("Name of the camera"))
+            await name.fill("half-typ")
+            ends.set()
+            await expect(lines.first).to_have_text(re.compile("^rtsp://127.0.0.1:.*: cannot open this video"))
+            await expect(lines.last).to_have_text(added)
+            await expect(name).to_be_focused()
+            await expect(name).to_have_value("half-typ")
+            await expect(page.get_by_label("Or an address")).to_have_value("rtsp://10.0.0.7/typed-meanwhile")
+            await try_address(page, works.url)
+            again = "this camera is in the list already"
+            await expect(lines).to_have_text([re.compile("cannot open"), re.compile(again)])
+            if AXE.exists():
+                assert await page_violations(page) == []
+
+
+async def test_a_trial_of_a_found_camera_is_reported_at_that_camera_and_survives_a_search(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("onvif", reason="needs onvif-zeep-async: the extra onvif")
+    with closing(camera()) as works:
+        async with silent_camera() as (silent, ends):
+            cameras = [
+                OnvifCamera(name, [FakeProfile("main", url, 64, 48, 12)])
+                for name, url in (("door", silent), ("yard", works.url))
+            ]
+            with onvif_cameras(*cameras) as targets:
+                monkeypatch.setenv("MYVIEW_DISCOVERY", targets)
+                async with setup_page(browser, tmp_path) as page:
+                    for name in ("door", "yard"):
+                        item = page.locator("#found > li", has_text=name)
+                        ask = item.get_by_role("button", name=re.compile("Show its streams"))
+                        await ask.focus()
+                        await page.keyboard.press("Enter")
+                        await expect(item).to_contain_text("1 stream.")
+                        await expect(ask).to_be_focused()
+                        await page.keyboard.press("Tab")
+                        await page.keyboard.press("Enter")
+                        await expect(item.get_by_role("button", name=re.compile("Try main"))).to_be_focused()
+                    door, yard = (
+                        page.get_by_role("list", name=f"Trials of {name}").locator("li")
+                        for name in ("door", "yard")
+                    )
+                    await expect(yard).to_have_text("127.0.0.1 main sends pictures and was added.")
+                    await expect(door).to_have_text("Trying 127.0.0.1 main…")
+                    await page.get_by_role("button", name="Search the network").click()
+                    await expect(page.locator("#search-state")).to_have_text("2 found.")
+                    ends.set()
+                    await expect(door).to_contain_text("127.0.0.1 main: rtsp://127.0.0.1")
+                    await expect(yard).to_contain_text("was added.")
+                    if AXE.exists():
+                        assert await page_violations(page) == []
