@@ -95,19 +95,27 @@ class UndetectedViewInference:
         touched = boxes_touching_others(
             expected, picture, samples.boxes, sample_picture, shape[1] * shape[2], self._size
         )
-        clarity = np.zeros(len(expected))
-        for column, at in enumerate(floor.cameras):
-            here = camera == column
-            clarity[here] = self._quality_buffer.clarity(self._cameras[at], expected[here])
+        clarity = self._clarity(floor, camera, expected)
         quality = _quality(expected, camera, clarity, floor.layout, self._quality_buffer.settings)
         quality *= probability[is_probable] * np.where(touched, 1.0, _NO_BOX_FACTOR)
-        # Each view holds for the frames up to the next inference.
+        frame, each = self._frames_until_next(time, frames)
+        return UndetectedViews(
+            frame, floor.cameras[camera[each]], samples.people[of[each]], quality[each], tested
+        )
+
+    def _clarity(self, floor: _Floor, camera: Ints, boxes: Floats) -> Floats:
+        """Return how clear the pictures of cameras (V,) of the floor are in boxes (V, 4), (V,)."""
+        clarity = np.zeros(len(boxes))
+        for column, at in enumerate(floor.cameras):
+            here = camera == column
+            clarity[here] = self._quality_buffer.clarity(self._cameras[at], boxes[here])
+        return clarity
+
+    def _frames_until_next(self, time: Ints, frames: int) -> tuple[Ints, Ints]:
+        """Return the frames (F,) for which samples (V,) hold, up to the next one, and the sample of each."""
         frame = time * self._interval + np.arange(self._interval)[:, None]
         is_inside = frame < frames
-        each = np.broadcast_to(np.arange(len(time)), frame.shape)[is_inside]
-        return UndetectedViews(
-            frame[is_inside], floor.cameras[camera[each]], samples.people[of[each]], quality[each], tested
-        )
+        return frame[is_inside], np.broadcast_to(np.arange(len(time)), frame.shape)[is_inside]
 
     def learn(self, undetected: UndetectedViews, frames: int) -> None:
         """Learn from the first frames of a window, which are decided now."""
