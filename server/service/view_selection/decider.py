@@ -19,7 +19,7 @@ from server.service.identity.sharding import create_sharding
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.view_selection.current_shots import CurrentShots
 from server.service.view_selection.explanation import SelectionReasons
-from server.service.view_selection.lookahead_window import LookaheadWindow
+from server.service.view_selection.lookahead_window import LookaheadSettings, LookaheadWindow
 from server.service.view_selection.mode_selection import ModeSelection
 from server.service.view_selection.recent_views import RecentViews
 from server.service.view_selection.undetected_view_inference import UndetectedViewInference
@@ -202,6 +202,7 @@ class ViewDecider:
 
     def _window(self, first: int, last: int) -> LookaheadWindow:
         """Return the look-ahead window of the frames from `first` to `last`, as known now."""
+        view = self._config.view
         return LookaheadWindow(
             self._cameras,
             self._quality_buffer,
@@ -209,13 +210,13 @@ class ViewDecider:
             self._has,
             first,
             last,
-            relative=self._config.view.quality.relative,
-            recent_views=self._recent_views,
-            decay_frames=self._config.view.presence_decay_s * self._config.site.fps,
-            undetected_view_inference=self._undetected_view_inference
-            if self._config.view.undetected_weight
-            else None,
-            undetected_weight=self._config.view.undetected_weight,
+            LookaheadSettings(
+                relative=view.quality.relative,
+                decay_frames=view.presence_decay_s * self._config.site.fps,
+                undetected_weight=view.undetected_weight,
+            ),
+            self._recent_views,
+            self._undetected_view_inference,
         )
 
     def _weight(self, lookahead: int) -> Floats:

@@ -24,12 +24,26 @@ Mask = NDArray[np.bool_]
 NO_RECENT_VIEWS = RecentViews()
 
 
+@dataclass(frozen=True, slots=True)
+class LookaheadSettings:
+    """How the views of a window are weighed.
+
+    Attributes:
+        relative: whether qualities are relative to the best view of a person in the frame.
+        decay_frames: frames after a missed detection for about which a person is assumed to be there.
+        undetected_weight: of inferred views; 0: there are none.
+    """
+
+    relative: bool
+    decay_frames: float = 0.0
+    undetected_weight: float = 0.0
+
+
 class LookaheadWindow:
     """The views of all people in the frames from `first` to `last`, as known at one epoch.
 
     One window serves all GOPs that the epoch decides. ``has(camera, pulse)`` returns whether a camera's frame
-    can be shown. ``recent_views`` are the last views before `first`; for about `decay_frames` frames after a
-    missed detection the person is assumed to be still there.
+    can be shown. ``recent_views`` are the last views before `first`.
     """
 
     def __init__(
@@ -40,12 +54,9 @@ class LookaheadWindow:
         has: Callable[[str, int], bool],
         first: int,
         last: int,
-        *,
-        relative: bool,
+        settings: LookaheadSettings,
         recent_views: RecentViews = NO_RECENT_VIEWS,
-        decay_frames: float = 0.0,
-        undetected_view_inference: UndetectedViewInference | None = None,
-        undetected_weight: float = 0.0,
+        inference: UndetectedViewInference | None = None,
     ) -> None:
         self.cameras, self.first = cameras, first
         self.numbers: Ints = np.array(people.known, dtype=np.int64)
@@ -67,28 +78,23 @@ class LookaheadWindow:
         )
         self.inferred_views = (
             UndetectedViews.empty()
-            if undetected_view_inference is None
-            else undetected_view_inference.infer(tracks, everyone, len(pulses))
+            if inference is None or not settings.undetected_weight
+            else inference.infer(tracks, everyone, len(pulses))
         )
         """For the people of all shards."""
         person = np.append(own_indices, -1)[everyone]
-        visible = np.flatnonzero((tracks.quality >= 0.0) & (person >= 0))
-        row, person = tracks.row[visible], person[visible]
-        cell = (tracks.frame * len(cameras) + tracks.camera)[row]
-        counts = _first_of_each(cell * count + person, shown.size * count)
-        counts &= shown.reshape(-1)[cell] & (tracks.quality[visible] > 0.0)
-        self._tracks, self._indices = tracks, visible[counts]
+        self._tracks, self._indices = tracks, _countable_views(tracks, person, shown, count)
         self.quality: Floats = tracks.quality[self._indices]
         """(R,) the quality of each view by itself."""
-        row, person = row[counts], person[counts]
+        row, person = tracks.row[self._indices], person[self._indices]
         frame, quality = tracks.frame[row], np.minimum(self.quality, 1.0)
         detected = (frame * len(cameras) + tracks.camera[row]) * count + person
         self.undetected = inferred = self.inferred_views.of(
-            own_indices, count, shown, detected, undetected_weight
+            own_indices, count, shown, detected, settings.undetected_weight
         )
         """Inferred views of this shard's people whom the camera does not detect."""
         inferred_quality = np.minimum(inferred.quality, 1.0)
-        if relative:
+        if settings.relative:
             moment = np.concatenate([frame * count + person, inferred.frame * count + inferred.person])
             both = relative_view_quality(
                 np.concatenate([quality, inferred_quality]), moment, len(pulses) * count
@@ -97,7 +103,7 @@ class LookaheadWindow:
         self.views = VisibleViews(frame, tracks.camera[row], person, quality, shown, count)
         self.before = recent_views.of(self.numbers, len(cameras), first)
         """Each person's last views before the first frame."""
-        missed = add_missed_detections(self.views, self.before, decay_frames)
+        missed = add_missed_detections(self.views, self.before, settings.decay_frames)
         self.effective_views = add_inferred_views(
             missed, inferred.frame, inferred.camera, inferred.person, inferred_quality
         )
@@ -179,6 +185,24 @@ class LookaheadPart:
             raise KeyError(number)
         inside = (views.frame >= self.first) & (views.frame < self.first + self.frames)
         return np.flatnonzero(inside & (views.person == person[0]))
+
+
+def _countable_views(tracks: WindowTracks, person: Ints, shown: Mask, people: int) -> Ints:
+    """Return the flat indices of the tracks' views that count, (R,), rising.
+
+    Of several tracks that show one person in one frame of a camera the first counts.
+
+    Args:
+        tracks: of the window.
+        person: (L,) who each view shows, below `people`; -1: nobody.
+        shown: (N, C) whether a camera's frame can be shown.
+        people: their number.
+    """
+    visible = np.flatnonzero((tracks.quality >= 0.0) & (person >= 0))
+    cell = (tracks.frame * shown.shape[1] + tracks.camera)[tracks.row[visible]]
+    counts = _first_of_each(cell * people + person[visible], shown.size * people)
+    counts &= shown.reshape(-1)[cell] & (tracks.quality[visible] > 0.0)
+    return visible[counts]
 
 
 def _first_of_each(values: Ints, count: int) -> Mask:

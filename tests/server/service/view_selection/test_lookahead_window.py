@@ -23,7 +23,7 @@ from server.messaging.messages import Box, CameraTracks
 from server.messaging.packed_arrays import pack_boxes
 from server.service.identity.person_tracker import PersonTracker
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.view_selection.lookahead_window import LookaheadWindow
+from server.service.view_selection.lookahead_window import LookaheadSettings, LookaheadWindow
 from server.service.view_selection.view_quality_buffer import ViewQualityBuffer
 
 WINDOW, EPOCHS = 3 * STRIDE, 5
@@ -114,7 +114,7 @@ def test_the_window_has_every_view_once_with_relative_quality(
         lambda camera, pulse: (camera, pulse) not in missing,
         2,
         last,
-        relative=relative,
+        LookaheadSettings(relative=relative),
     )
     views = window.views
     quality_of_view = {
