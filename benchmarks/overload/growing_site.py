@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import subprocess
-import sys
 import time
 import urllib.error
 import urllib.request
@@ -14,8 +13,7 @@ from typing import IO
 
 import yaml
 
-from benchmarks.common.environment import ROOT, one_thread_environment
-from benchmarks.streaming.stream_site import terminate
+from benchmarks.common.started_processes import start_module, terminate
 from server.cli.generated_config import free_port
 from synthetic import Scene, write_recording
 
@@ -27,6 +25,7 @@ _PEOPLE, _SEED, _FILM_S = 4, 1, 40.0
 _PATIENCE_S = 60.0
 _POLL_S = 0.2
 LOG = "site.log"
+_COMMAND = "server.cli.main"
 
 
 class GrowingSite:
@@ -40,7 +39,7 @@ class GrowingSite:
     def add(self) -> None:
         """Start one more camera."""
         name = f"c{len(self.cameras)}"
-        self.cameras[name] = _start(self._log, "camera", str(self._config), name)
+        self.cameras[name] = start_module(self._log, _COMMAND, "camera", str(self._config), name)
 
     def kill_all_but(self, count: int) -> None:
         """Kill all cameras but the first `count`."""
@@ -73,19 +72,13 @@ def run_growing_site(most: int, folder: Path) -> Iterator[GrowingSite]:
     config = folder / "site.yaml"
     config.write_text(yaml.safe_dump(content), encoding="utf-8")
     with (folder / LOG).open("wb") as log:
-        started = [_start(log, name, str(config)) for name in ("bestview", "sync")]
+        started = [start_module(log, _COMMAND, name, str(config)) for name in ("bestview", "sync")]
         site = GrowingSite(config, f"http://127.0.0.1:{http}/", log)
         try:
             _wait_until_up(site.url)
             yield site
         finally:
             terminate([*site.cameras.values(), *started])
-
-
-def _start(log: IO[bytes], *words: str) -> subprocess.Popen[bytes]:
-    environment = {**one_thread_environment(), "MYVIEW_SUPERVISED": "1"}
-    command = [sys.executable, "-m", "server.cli.main", *words]
-    return subprocess.Popen(command, cwd=ROOT, env=environment, stdout=log, stderr=log)
 
 
 def _wait_until_up(url: str) -> None:

@@ -8,18 +8,16 @@ from __future__ import annotations
 
 import contextlib
 import subprocess
-import sys
 import time
 import urllib.request
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 
 import yaml
 
-from benchmarks.common.environment import ROOT, one_thread_environment
 from benchmarks.common.process_load import lag_percentile
+from benchmarks.common.started_processes import start_module, terminate
 from benchmarks.scaling.simulated_hall import FPS, HEIGHT, STRIDE, WIDTH, SimulatedHall
 from benchmarks.scaling.timed_service import LISTS, REST, STAGES, ServiceTimes
 from server.cli.generated_config import free_port
@@ -139,7 +137,7 @@ def _running(hall: SimulatedHall, fps: float, folder: Path, services: int) -> It
     https = [free_port() for _ in range(services)]
     halves = [range(hall.cameras // 2), range(hall.cameras // 2, hall.cameras)]
     with (folder / _LOG).open("wb") as log:
-        started = [_start(log, "server.cli.main", "sync", str(slow_pulses))]
+        started = [start_module(log, "server.cli.main", "sync", str(slow_pulses))]
         running = []
         for index, port in enumerate(https):
             times = folder / f"times{index}.json"
@@ -149,10 +147,10 @@ def _running(hall: SimulatedHall, fps: float, folder: Path, services: int) -> It
                 "MYVIEW_ZENOH__LISTEN": routers[index],
             }
             words = ["benchmarks.scaling.timed_service", str(times), "bestview", str(config)]
-            started.append(_start(log, *words, **own))
+            started.append(start_module(log, *words, **own))
             running.append(_Service(started[-1], times, f"http://127.0.0.1:{port}/"))
         started += [
-            _start(
+            start_module(
                 log,
                 "benchmarks.scaling.simulated_cameras",
                 str(config),
@@ -165,7 +163,7 @@ def _running(hall: SimulatedHall, fps: float, folder: Path, services: int) -> It
         try:
             yield running
         finally:
-            _terminate(started)
+            terminate(started)
 
 
 def _write_configs(
@@ -190,22 +188,6 @@ def _write_configs(
     config.write_text(yaml.safe_dump(content), encoding="utf-8")
     slow_pulses.write_text(yaml.safe_dump(content | {"site": site | {"fps": fps}}), encoding="utf-8")
     return config, slow_pulses, routers
-
-
-def _terminate(processes: Sequence[subprocess.Popen[bytes]]) -> None:
-    for process in processes:
-        process.terminate()
-    for process in processes:
-        try:
-            process.wait(15.0)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-
-
-def _start(log: IO[bytes], *words: str, **own: str) -> subprocess.Popen[bytes]:
-    environment = {**one_thread_environment(), "MYVIEW_SUPERVISED": "1", **own}
-    return subprocess.Popen([sys.executable, "-m", *words], cwd=ROOT, env=environment, stdout=log, stderr=log)
 
 
 def _after(times: Path, epochs: int, folder: Path) -> ServiceTimes:

@@ -13,8 +13,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from benchmarks.common.started_processes import terminate
 from benchmarks.streaming.simulated_cameras import ENCODE, GOP, SITE
-from benchmarks.streaming.stream_site import StreamSite, terminate
+from benchmarks.streaming.stream_site import StreamSite
 from server.camera.encoder import AccessUnit
 from server.cli.generated_config import free_port
 

@@ -12,12 +12,12 @@ import urllib.error
 import urllib.request
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import IO
 
 import msgspec
 import yaml
 
 from benchmarks.common.environment import ROOT, one_thread_environment
+from benchmarks.common.started_processes import start_module, terminate
 from benchmarks.scaling.simulated_hall import SimulatedHall
 from benchmarks.streaming import timed_service
 from benchmarks.streaming.simulated_cameras import CAMERAS, ENCODE, SITE, save
@@ -115,12 +115,12 @@ def running(films: Sequence[Sequence[AccessUnit]], folder: Path) -> Iterator[Str
     }
     config.write_text(yaml.safe_dump(content), encoding="utf-8")
     with (folder / _LOG).open("wb") as log:
-        processes = [_start(log, "server.cli.main", "sync", str(config))]
-        service = _start(
+        processes = [start_module(log, "server.cli.main", "sync", str(config))]
+        service = start_module(
             log, "benchmarks.streaming.timed_service", str(folder / "sent"), "bestview", str(config)
         )
         cameras = [str(config), str(folder / "films"), f"{PER_CAMERA}"]
-        processes += [service, _start(log, "benchmarks.streaming.simulated_cameras", *cameras)]
+        processes += [service, start_module(log, "benchmarks.streaming.simulated_cameras", *cameras)]
         try:
             yield StreamSite(http, service, folder)
         finally:
@@ -140,22 +140,3 @@ def viewers(port: int) -> Iterator[ViewerProcess]:
         for stream in (process.stdin, process.stdout):
             assert stream is not None  # noqa: S101 — it was started with pipes
             stream.close()
-
-
-def terminate(processes: Sequence[subprocess.Popen[bytes]]) -> None:
-    """Terminate processes; kill those that do not exit."""
-    for process in processes:
-        process.terminate()
-    for process in processes:
-        try:
-            process.wait(15.0)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-
-
-def _start(log: IO[bytes], *arguments: str) -> subprocess.Popen[bytes]:
-    environment = {**one_thread_environment(), "MYVIEW_SUPERVISED": "1"}
-    return subprocess.Popen(
-        [sys.executable, "-m", *arguments], cwd=ROOT, env=environment, stdout=log, stderr=log
-    )
