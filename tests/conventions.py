@@ -87,12 +87,12 @@ def parsed(*folders: str, having: str = "") -> Iterator[tuple[Path, ast.Module]]
 
 
 def shared_class_names() -> dict[str, list[str]]:
-    """Return the public classes that share a name within a room: paths by room and name."""
+    """Return the public classes that share a name within a package: paths by package and name."""
     places: dict[str, list[str]] = defaultdict(list)
     for path in tracked(*PRODUCT):
         if path.suffix == ".py":
             for name in _PUBLIC_CLASS.findall((ROOT / path).read_text(encoding="utf-8")):
-                places[f"{room_of(path)}: {name}"].append(str(path))
+                places[f"{path.parts[0]}: {name}"].append(str(path))
     return {name: paths for name, paths in places.items() if len(paths) > 1}
 
 
@@ -141,7 +141,7 @@ def main() -> None:
     product = sum(room.lines for room in rooms() if room.name.split("/")[0] in PRODUCT)
     print(f"\nlines of product: {product}")
     print(f"folders with more than 20 files: {flat_folders(20) or 'none'}")
-    print(f"public classes that share a name within a room: {shared_class_names() or 'none'}")
+    print(f"public classes that share a name within a package: {shared_class_names() or 'none'}")
     docstrings = docstrings_beginning_with(("Give", "Tell", "Say"), ".")
     print(f"docstrings that begin with Give, Tell or Say: {len(docstrings)}")
     print(f"words: README {words_of('README.md')}, docs {words_of('docs')}")

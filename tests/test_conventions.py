@@ -29,7 +29,7 @@ def test_no_module_of_the_product_is_too_long() -> None:
     assert {room.largest_file: room.largest for room in product if room.largest > MAX_LINES_PER_MODULE} == {}
 
 
-def test_no_two_public_classes_of_a_room_share_a_name() -> None:
+def test_no_two_public_classes_of_a_package_share_a_name() -> None:
     assert shared_class_names() == {}
 
 

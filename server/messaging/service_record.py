@@ -48,7 +48,7 @@ class DeletedPerson(msgspec.Struct, frozen=True, kw_only=True):
     """Whether the recorded video and sound of the times in which they were visible are deleted, too."""
 
 
-class Stay(msgspec.Struct, frozen=True, array_like=True):
+class AreaStay(msgspec.Struct, frozen=True, array_like=True):
     """How long a person has been in an area."""
 
     first_seen: Pulse
@@ -68,7 +68,7 @@ class ServiceRecord(msgspec.Struct, frozen=True, kw_only=True):
     lowest leads; of equal ones, that with the lowest index. One that was stopped follows the others."""
     cameras: Annotated[dict[str, CameraIdentitySnapshot], msgspec.Meta(max_length=_CAMERAS_MAX)]
     """What each camera tracks."""
-    in_area: Annotated[dict[PersonNumber, Stay], msgspec.Meta(max_length=_PEOPLE_MAX)] = {}
+    in_area: Annotated[dict[PersonNumber, AreaStay], msgspec.Meta(max_length=_PEOPLE_MAX)] = {}
     """The people in the area of the service, by number; empty: there are no areas."""
     next_numbers: Annotated[list[NextNumber], msgspec.Meta(max_length=SERVICES_MAX)] = []
     """By area, the first number that its services have not assigned, as far as is known."""

@@ -28,6 +28,7 @@ from server.rtsp.mp4_reader import (  # noqa: E402
     Track,
     with_parameter_sets,
 )
+from server.rtsp.presentation_clock import PresentationClock  # noqa: E402
 from server.rtsp.request import StreamAddress  # noqa: E402
 from server.rtsp.service_stream import (  # noqa: E402
     Service,
@@ -35,7 +36,6 @@ from server.rtsp.service_stream import (  # noqa: E402
     ServiceStream,
     StreamRefusedError,
 )
-from server.rtsp.stream_clock import StreamClock  # noqa: E402
 
 log = logging.getLogger(__name__)
 
@@ -109,8 +109,8 @@ class Feed:
         self._stopped.set()
         self._stream.close()
 
-    def _new_clock(self) -> StreamClock:
-        return StreamClock(_SLACK_S if self.address.is_paced else 0.0)
+    def _new_clock(self) -> PresentationClock:
+        return PresentationClock(_SLACK_S if self.address.is_paced else 0.0)
 
     def _first_head(self) -> Head:
         with contextlib.suppress(Mp4Error):

@@ -9,7 +9,7 @@ from __future__ import annotations
 from importlib.metadata import version
 from typing import Any, get_args
 
-from server.integrations.mqtt.site_state import PersonState, RuleState, SiteState, Topics
+from server.integrations.mqtt.site_state import PublishedPerson, PublishedRule, SiteState, Topics
 from tracking.types import PictureCondition
 
 _CAMERA_STATES = ["starting", "live", "gone", "ended", "refused"]
@@ -114,7 +114,7 @@ def _site(state: SiteState, topics: Topics, *, may_operate: bool) -> Components:
     return components
 
 
-def _rule(rule: RuleState, topics: Topics) -> Components:
+def _rule(rule: PublishedRule, topics: Topics) -> Components:
     picture = {
         "platform": "image",
         "name": f"{rule.rule} picture",
@@ -153,7 +153,7 @@ def _camera(topic: str) -> Components:
     }
 
 
-def _person(person: PersonState, topics: Topics, state: SiteState) -> Components:
+def _person(person: PublishedPerson, topics: Topics, state: SiteState) -> Components:
     topic = topics.person(person.key)
     components: Components = {
         "presence": {

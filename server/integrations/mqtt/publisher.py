@@ -19,7 +19,7 @@ from logthrottle import LogThrottle
 from server.config.sections import MqttSettings
 from server.integrations.mqtt.discovery import discovery_messages, person_discovery, without_removed
 from server.integrations.mqtt.site_reader import SiteReader
-from server.integrations.mqtt.site_state import PersonState, Topics, person_content, state_messages
+from server.integrations.mqtt.site_state import PublishedPerson, Topics, person_content, state_messages
 from server.integrations.secret_files import read_secret
 from server.service.facade.rules import PicturedEvent, event_without
 from server.system.errors import UserError, reason_of
@@ -49,7 +49,7 @@ class MqttPublisher:
         """Retained messages as the broker has them, by topic."""
         self._devices: dict[str, dict[str, Any]] = {}
         """Discovery messages likewise."""
-        self._absent = msgspec.json.encode(person_content(PersonState(""), self._topics))
+        self._absent = msgspec.json.encode(person_content(PublishedPerson(""), self._topics))
         self._stale: set[str] = set()
         """States of people of an earlier run who are not known now, by topic."""
         self._failures = LogThrottle()
@@ -223,7 +223,7 @@ class MqttPublisher:
                 await self._publish_picture(client, person)
             await asyncio.sleep(self._settings.pictures_every_s)
 
-    async def _publish_picture(self, client: aiomqtt.Client, person: PersonState) -> None:
+    async def _publish_picture(self, client: aiomqtt.Client, person: PublishedPerson) -> None:
         picture = await self._reader.picture_of(person)
         if picture is not None:
             await client.publish(self._topics.person_picture(person.key), picture, qos=0)

@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
-from server.integrations.mqtt.site_state import CameraState, PersonState, RuleState, SiteState, person_key
+from server.integrations.mqtt.site_state import (
+    PublishedCamera,
+    PublishedPerson,
+    PublishedRule,
+    SiteState,
+    person_key,
+)
 from server.service.facade.people import PersonSummary
 from server.service.facade.rendering import PersonView, PictureTimeoutError, RenderPoolFullError
 from server.service.service import BestViewService
@@ -16,7 +22,7 @@ class SiteReader:
 
     def __init__(self, service: BestViewService) -> None:
         self._service = service
-        self._named: dict[str, PersonState] = {}
+        self._named: dict[str, PublishedPerson] = {}
 
     @property
     def site(self) -> str:
@@ -43,12 +49,12 @@ class SiteReader:
             persons=self._persons(people, elsewhere),
             elsewhere={person_key(name) for name in elsewhere},
             cameras=[
-                CameraState(camera.camera, camera.state, camera.condition, camera.covered_share)
+                PublishedCamera(camera.camera, camera.state, camera.condition, camera.covered_share)
                 for camera in service.cameras.list_cameras()
                 if keepers is None or camera.camera in keepers
             ],
             zones={zone.zone: len(zone.objects) for zone in rules.zones if zone.area is not None},
-            rules=[RuleState(rule.rule, rule.kind, rule.lasting) for rule in rules.rules],
+            rules=[PublishedRule(rule.rule, rule.kind, rule.lasting) for rule in rules.rules],
             recording=recording.is_on if recording.enabled else None,
         )
 
@@ -56,7 +62,7 @@ class SiteReader:
         """Switch recording to disk on or off."""
         self._service.recordings.switch(is_on=is_on)
 
-    async def picture_of(self, person: PersonState) -> bytes | None:
+    async def picture_of(self, person: PublishedPerson) -> bytes | None:
         """Return a new picture of a person's best view, JPEG; None: they are absent, or it cannot be had."""
         if not person.is_present or person.number is None:
             return None
@@ -76,7 +82,7 @@ class SiteReader:
         elsewhere = {name for number, name in names.items() if not self._service.people.is_reported(number)}
         return elsewhere.difference(person.name for person in people if person.name)
 
-    def _persons(self, people: list[PersonSummary], elsewhere: set[str]) -> list[PersonState]:
+    def _persons(self, people: list[PersonSummary], elsewhere: set[str]) -> list[PublishedPerson]:
         """Return all named people; of several with one name the present one, or the one seen last."""
         now: dict[str, PersonSummary] = {}
         for person in people:
@@ -87,11 +93,11 @@ class SiteReader:
         for name, person in now.items():
             is_present = self._is_present(person)
             zones = tuple(self._service.rules.zones_of(person.number)) if is_present else ()
-            self._named[name] = PersonState(name, person.number, is_present, person.camera, zones)
+            self._named[name] = PublishedPerson(name, person.number, is_present, person.camera, zones)
         for name in list(self._named):
             if name not in now:
                 if name in current_names - elsewhere:
-                    self._named[name] = PersonState(name)
+                    self._named[name] = PublishedPerson(name)
                 else:  # renamed, or forgotten
                     del self._named[name]
         return sorted(self._named.values(), key=lambda person: person.name)

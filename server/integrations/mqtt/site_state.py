@@ -19,7 +19,7 @@ _LASTING = frozenset({RuleKind.STAYED, RuleKind.CROWDED, RuleKind.CLOSE})
 
 
 @dataclass(frozen=True, slots=True)
-class PersonState:
+class PublishedPerson:
     """A named person.
 
     Attributes:
@@ -43,7 +43,7 @@ class PersonState:
 
 
 @dataclass(frozen=True, slots=True)
-class CameraState:
+class PublishedCamera:
     """A camera: ``state``, ``condition`` and ``covered_share`` as in `/api/cameras`."""
 
     camera: str
@@ -58,7 +58,7 @@ class CameraState:
 
 
 @dataclass(frozen=True, slots=True)
-class RuleState:
+class PublishedRule:
     """A rule, and whether what it is about lasts now."""
 
     rule: str
@@ -84,10 +84,10 @@ class SiteState:
 
     site: str
     people: int
-    persons: Sequence[PersonState]
-    cameras: Sequence[CameraState]
+    persons: Sequence[PublishedPerson]
+    cameras: Sequence[PublishedCamera]
     zones: Mapping[str, int]
-    rules: Sequence[RuleState]
+    rules: Sequence[PublishedRule]
     recording: bool | None
     elsewhere: Collection[str] = ()
 
@@ -182,7 +182,7 @@ def state_messages(state: SiteState, topics: Topics) -> dict[str, bytes]:
     return encoded
 
 
-def person_content(person: PersonState, topics: Topics) -> dict[str, object]:
+def person_content(person: PublishedPerson, topics: Topics) -> dict[str, object]:
     """Return what is told about a named person."""
     content: dict[str, object] = {
         "presence": on_or_off(is_on=person.is_present),

@@ -18,8 +18,8 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SearchedCamera:
-    """A camera of today.
+class CameraPlacement:
+    """Where a camera's picture lies, as it is configured and calibrated today.
 
     Attributes:
         name: its id.
@@ -37,7 +37,7 @@ class SearchedCamera:
 class SightedPlaces:
     """Places of S sightings in areas. A place on the floor is the mean over the cameras that see the feet."""
 
-    def __init__(self, sightings: Sightings, cameras: Sequence[SearchedCamera]) -> None:
+    def __init__(self, sightings: Sightings, cameras: Sequence[CameraPlacement]) -> None:
         self._cameras = cameras
         overhead = np.array([camera.is_overhead for camera in cameras], dtype=np.bool_)[sightings.cameras]
         boxes = sightings.boxes.copy()

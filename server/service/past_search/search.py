@@ -10,16 +10,16 @@ import numpy as np
 
 from server.media.letterbox import Letterbox
 from server.rules import Area
-from server.service.past_search.places import SearchedCamera, SightedPlaces
+from server.service.past_search.places import CameraPlacement, SightedPlaces
 from server.service.past_search.sightings import Sightings, read_sightings
 from server.service.past_search.stays import Place, RecordedPerson, Stay, StayCollector
-from server.service.past_search.worker import FoundPerson, FoundStay, SearchResult, SearchTask
+from server.service.past_search.worker import FoundPerson, FoundStay, SearchTask, StaySearchResult
 
 
-def search(task: SearchTask) -> SearchResult:
+def search(task: SearchTask) -> StaySearchResult:
     """Search; files that are missing, as retention may have deleted them, are skipped."""
     cameras = [
-        SearchedCamera(
+        CameraPlacement(
             camera.camera,
             None if camera.size is None else Letterbox(camera.size, task.site_size),
             None if camera.ground is None else np.array(camera.ground, dtype=np.float64),
@@ -56,7 +56,7 @@ def _chunks(task: SearchTask) -> Iterator[tuple[str, list[bytes]]]:
 class _Collector:
     """Adds the sightings of a file to the stays at each place that the task asks for."""
 
-    def __init__(self, task: SearchTask, cameras: list[SearchedCamera]) -> None:
+    def __init__(self, task: SearchTask, cameras: list[CameraPlacement]) -> None:
         self._cameras = cameras
         self.indexes = {camera.name: index for index, camera in enumerate(cameras)}
         self._areas = [Area(zone.zone, tuple(zone.corners), zone.camera) for zone in task.zones]
@@ -89,7 +89,7 @@ class _Collector:
         self.stays.add(run, place, sightings.pulses, sightings.numbers, sightings.cameras)
 
 
-def _result(task: SearchTask, stays: list[Stay], end: int) -> SearchResult:
+def _result(task: SearchTask, stays: list[Stay], end: int) -> StaySearchResult:
     stays.sort(key=lambda stay: (stay.first, stay.person.run, stay.person.number))
     if task.order == "newest":
         stays.reverse()
@@ -117,7 +117,7 @@ def _result(task: SearchTask, stays: list[Stay], end: int) -> SearchResult:
         )
         for stay in stays[: task.limit]
     ]
-    return SearchResult(end, listed, summaries[: task.limit], len(stays))
+    return StaySearchResult(end, listed, summaries[: task.limit], len(stays))
 
 
 def _person(person: RecordedPerson, stays: list[Stay], until: int) -> FoundPerson:

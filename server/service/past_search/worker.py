@@ -100,7 +100,7 @@ class FoundPerson(msgspec.Struct, frozen=True, array_like=True):
     stays: int
 
 
-class SearchResult(msgspec.Struct, frozen=True):
+class StaySearchResult(msgspec.Struct, frozen=True):
     """What was found up to a pulse."""
 
     end: int
@@ -116,14 +116,14 @@ class SearchError(Exception):
     """The search process has failed; the text is one line."""
 
 
-async def run_search(task: SearchTask) -> SearchResult:
+async def run_search(task: SearchTask) -> StaySearchResult:
     """Search in a separate process, which is killed if the caller is cancelled, or it takes too long.
 
     Raises:
         SearchError: the process cannot be started, failed, or took too long.
     """
     try:
-        return await ask_new_worker("server.service.past_search", task, SearchResult, SEARCH_TIMEOUT_S)
+        return await ask_new_worker("server.service.past_search", task, StaySearchResult, SEARCH_TIMEOUT_S)
     except TimeoutError as error:
         raise SearchError(f"the recording was not read within {SEARCH_TIMEOUT_S:g} s") from error
     except OSError as error:

@@ -10,7 +10,7 @@ import msgspec
 
 from server.config.sections import ShareSettings
 from server.messaging.camera_identity_snapshot import PERSON_NUMBER_MAX
-from server.messaging.service_record import ServiceRecord, Stay
+from server.messaging.service_record import AreaStay, ServiceRecord
 from server.service.identity.local_numbers import TrackName
 from server.service.identity.person_tracker import PersonTracker
 from server.service.identity.sharding import OtherArea, ShardingByArea
@@ -55,13 +55,13 @@ class AreaAgreement:
         """Return whether a record is of a service of another area."""
         return bool(self._share.areas) and record.service % self._share.of != self._share.share
 
-    def present(self) -> dict[int, Stay]:
+    def present(self) -> dict[int, AreaStay]:
         """Return since when each person in the area has been known, by number, and was there."""
         area, seen = self._people.sharding, self._people.registry.first_seen
         if not isinstance(area, ShardingByArea):
             return {}
         return {
-            number: Stay(first_seen=max(seen[number], 0), here=max(last, 0))
+            number: AreaStay(first_seen=max(seen[number], 0), here=max(last, 0))
             for number, last in sorted(area.present.items())
             if number in seen
         }
@@ -133,7 +133,7 @@ class AreaAgreement:
         return sum(self._follow(numbers[each.pulse], own[each.pulse].in_area, each) for each in due)
 
     def _follow(
-        self, own: Mapping[TrackName, int], in_area: Mapping[int, Stay], other: ServiceRecord
+        self, own: Mapping[TrackName, int], in_area: Mapping[int, AreaStay], other: ServiceRecord
     ) -> bool:
         """Take over the numbers of people in another area; return whether any has changed.
 
@@ -178,7 +178,7 @@ class AreaAgreement:
         }
 
 
-def _is_older(own: int, in_area: Mapping[int, Stay], number: int, there: Mapping[int, Stay]) -> bool:
+def _is_older(own: int, in_area: Mapping[int, AreaStay], number: int, there: Mapping[int, AreaStay]) -> bool:
     """Return whether a number of another area does not count: nobody has it there, or they came from here."""
     if number not in there:
         return True

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from fakes.integrations.home_assistant import problems_of
 from server.integrations.mqtt.discovery import discovery_messages, without_removed
 from server.integrations.mqtt.site_state import (
-    CameraState,
-    PersonState,
-    RuleState,
+    PublishedCamera,
+    PublishedPerson,
+    PublishedRule,
     SiteState,
     Topics,
     person_key,
@@ -27,13 +27,13 @@ TOPICS = Topics("myview", "hall")
 STATE = SiteState(
     site="hall",
     people=3,
-    persons=[PersonState("Ann", 3, is_present=True, camera="c1", zones=("till",)), PersonState("Bé")],
-    cameras=[CameraState("c0", "live", "clear"), CameraState("c1", "gone", "clear")],
+    persons=[PublishedPerson("Ann", 3, is_present=True, camera="c1", zones=("till",)), PublishedPerson("Bé")],
+    cameras=[PublishedCamera("c0", "live", "clear"), PublishedCamera("c1", "gone", "clear")],
     zones={"till": 2},
     rules=[
-        RuleState("in", "entered", is_lasting=False),
-        RuleState("door", "crossed", is_lasting=False),
-        RuleState("queue", "crowded", is_lasting=True),
+        PublishedRule("in", "entered", is_lasting=False),
+        PublishedRule("door", "crossed", is_lasting=False),
+        PublishedRule("queue", "crowded", is_lasting=True),
     ],
     recording=True,
 )
@@ -87,12 +87,12 @@ def test_states_of_a_person() -> None:
 @pytest.mark.parametrize(
     ("camera", "problem"),
     [
-        (CameraState("c0", "live", "clear"), "OFF"),
-        (CameraState("c0", "live", "blurred"), "ON"),
-        (CameraState("c0", "live", "clear", 0.3), "ON"),
+        (PublishedCamera("c0", "live", "clear"), "OFF"),
+        (PublishedCamera("c0", "live", "blurred"), "ON"),
+        (PublishedCamera("c0", "live", "clear", 0.3), "ON"),
     ],
 )
-def test_a_camera_that_does_not_show_all_has_a_problem(camera: CameraState, problem: str) -> None:
+def test_a_camera_that_does_not_show_all_has_a_problem(camera: PublishedCamera, problem: str) -> None:
     published = state_messages(replace(STATE, cameras=[camera]), TOPICS)
     assert json.loads(published[TOPICS.camera("c0")])["problem"] == problem
 

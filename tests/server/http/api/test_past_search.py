@@ -20,7 +20,7 @@ from server.messaging.messages import Box
 from server.service.facade import past_search
 from server.service.past_search import worker
 from server.service.past_search.search import search
-from server.service.past_search.worker import SearchResult, SearchTask
+from server.service.past_search.worker import SearchTask, StaySearchResult
 from server.service.recording.recording_folder import RecordingFolder
 
 A, B = CAMERAS
@@ -37,7 +37,7 @@ EPOCHS = 20
 """Person 1 is left for ten GOPs of 0.2 s, then right; person 2 is in c1 in the first eight."""
 
 
-async def search_here(task: SearchTask) -> SearchResult:
+async def search_here(task: SearchTask) -> StaySearchResult:
     """Search without another process, whose start takes most of the time."""
     return search(task)
 
@@ -217,7 +217,7 @@ class Waiting:
         self.go_on = asyncio.Event()
         monkeypatch.setattr(past_search, "run_search", self.search)
 
-    async def search(self, task: SearchTask) -> SearchResult:
+    async def search(self, task: SearchTask) -> StaySearchResult:
         self.running += 1
         self.most = max(self.most, self.running)
         try:

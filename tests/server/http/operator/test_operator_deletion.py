@@ -23,7 +23,7 @@ from server.service.deletion.journal import JOURNAL_FILE, Deletion, DeletionJour
 from server.service.deletion.recorded_traces import RecordedTraces, find_traces
 from server.service.facade import deletion, past_search
 from server.service.past_search.search import search
-from server.service.past_search.worker import SearchResult, SearchTask
+from server.service.past_search.worker import SearchTask, StaySearchResult
 from server.service.recording.recording_session import RecordingSession
 from server.service.recording.segment_index import IndexEntry, SegmentIndex
 
@@ -31,7 +31,7 @@ DELETION = "/api/operator/deletion"
 A, B = CAMERAS
 
 
-async def search_here(task: SearchTask) -> SearchResult:
+async def search_here(task: SearchTask) -> StaySearchResult:
     return search(task)
 
 

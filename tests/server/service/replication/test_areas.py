@@ -11,7 +11,7 @@ from benchmarks.scaling.divided_hall import DividedRun, Observed, agreement, div
 from benchmarks.scaling.simulated_hall import SimulatedHall
 from fakes.service.scripted_cameras import LARGE, SMALL, FedService, TrackNumbers, small_config
 from server.messaging.camera_identity_snapshot import CameraIdentitySnapshot, PersonSnapshot
-from server.messaging.service_record import ServiceRecord, Stay
+from server.messaging.service_record import AreaStay, ServiceRecord
 from server.service.replication.areas import AreaAgreement
 
 
@@ -70,7 +70,7 @@ class TestAgreement:
             pulse=pulse,
             unbroken_since=0,
             cameras={"c1": snapshot},
-            in_area={number: Stay(first_seen=since, here=pulse) for number, since in in_area.items()},
+            in_area={number: AreaStay(first_seen=since, here=pulse) for number, since in in_area.items()},
             next_numbers=[600, 31],
         )
 
@@ -112,7 +112,7 @@ class TestAgreement:
         agreement = AreaAgreement(service.config.view.share, people, 25.0)
         for pulse, is_visible in [(20, True), (45, True), (46, False), (9000, False)]:
             there = self.record(1, pulse, {}, {77: 0})
-            stays = {77: Stay(first_seen=0, here=20)}
+            stays = {77: AreaStay(first_seen=0, here=20)}
             agreement.step({}, [msgspec.structs.replace(there, in_area=stays)])
             assert people.sharding.is_visible_elsewhere(77) is is_visible
         assert people.of_other_shards == [77], "they belong to it nevertheless"

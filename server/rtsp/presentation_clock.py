@@ -8,7 +8,7 @@ _SLEW_S = 0.002
 """What each keyframe may correct: two clocks differ by some millionths."""
 
 
-class StreamClock:
+class PresentationClock:
     """Maps media time to the pipeline's running time, both in seconds.
 
     ``slack_s`` is how long before its time a keyframe may arrive: a best view comes in whole GOPs, which are
