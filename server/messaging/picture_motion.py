@@ -1,4 +1,4 @@
-"""Where a camera's picture was before the camera was knocked or turned: there its homography holds."""
+"""Maps boxes of a camera that was knocked or turned to where they were before, for its homography."""
 
 from __future__ import annotations
 

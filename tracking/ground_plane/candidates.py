@@ -1,4 +1,4 @@
-"""People who may have arrived, but not for sure: their evidence before the window.
+"""Candidates: people who may have arrived, and the evidence for them before the window.
 
 Whom a single camera sees is hardly ever certain within one window. A candidate collects the log likelihood
 ratio of being a person frame by frame, and is dropped when it falls to zero, where a new one would begin

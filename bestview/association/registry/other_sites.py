@@ -1,4 +1,4 @@
-"""People between sites: whose ids are whose, and what one site knows about people whom another one sees.
+"""Identity across sites: series of ids, sightings by other sites, and appearance compared between them.
 
 Each site has a registry of its own. Ids are unique over all of them, since each assigns only those of its
 series. Appearance travels as a person's mean histogram over the site's cameras, with that of all people of

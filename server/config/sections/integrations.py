@@ -1,4 +1,4 @@
-"""The sections `mqtt` and `webhooks`: other systems that hear what the site sees."""
+"""The sections `mqtt` and `webhooks`: other systems that get its state and events."""
 
 from __future__ import annotations
 

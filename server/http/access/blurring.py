@@ -1,4 +1,4 @@
-"""What a viewer may request who sees people pixelated.
+"""Routes that are allowed to viewers who see people pixelated.
 
 Streams that are passed on as the cameras encode them cannot be changed. Such a viewer gets only those that
 the server draws, and nothing else that identifies people. A route that is not listed here is refused.

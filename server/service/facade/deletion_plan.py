@@ -1,4 +1,4 @@
-"""What the deletion of a person takes with it: of them, and of others."""
+"""The plan of a deletion: what is deleted of a person, and what others lose."""
 
 from __future__ import annotations
 

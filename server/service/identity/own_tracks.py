@@ -1,4 +1,4 @@
-"""Which of a camera's own tracks shows whom, where people are tracked jointly.
+"""Links each camera's own tracks to the people who are tracked jointly on the ground.
 
 Cameras track by themselves, too: their tracks outlive this service, and thumbnails name them.
 """

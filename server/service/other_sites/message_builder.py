@@ -41,7 +41,7 @@ _VIEWERS_EVERY = 10
 
 @dataclass(slots=True)
 class _Sent:
-    """What was said about a person: at which message, and how many frames of the histogram at which."""
+    """What was sent about a person, and by which message: they themselves, and their histogram."""
 
     is_visible: bool
     at: int
@@ -53,7 +53,7 @@ class _Sent:
 
 
 class SiteMessageBuilder:
-    """Builds them; each is the next of a row."""
+    """Builds the messages; each continues where the last one ended."""
 
     def __init__(self, config: Config, people: PersonTracker, here: PeopleHere) -> None:
         self._sites, self._fps = config.sites, config.site.fps

@@ -34,7 +34,7 @@ class PersonHere:
 
 
 class PeopleHere:
-    """Finds them, and remembers since when each has been here."""
+    """Finds the people here, and remembers since when each has been here."""
 
     def __init__(self, people: PersonTracker, fps: float) -> None:
         self._people, self._unseen = people, frames_in(VISIBLE_S, fps)

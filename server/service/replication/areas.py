@@ -1,4 +1,4 @@
-"""Services that divide a site by area: whom two of them see has one number, and is served where they are."""
+"""Agreement between the services of different areas: a person whom two of them see has one number."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a worker is spoken to: each request has one answer; both are length-prefixed MessagePack.
+"""The protocol of a worker: each request has one answer; both are length-prefixed MessagePack.
 
 The first message is the worker's settings; the answer is :data:`READY`.
 """
