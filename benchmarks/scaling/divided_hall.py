@@ -29,7 +29,7 @@ from server.messaging.inbox import Message
 from server.messaging.messages import CameraTracks, ZenohKeys
 from server.service.bus_connection import BusConnection
 from server.service.identity.person_tracker import PersonTracker
-from server.service.identity.service_area import area_to_take_in
+from server.service.identity.service_area import ingest_area
 from server.service.identity.sharding import create_sharding
 from server.service.identity.state_replication import StateReplication
 from server.service.ingest.epoch_aligner import Epoch
@@ -153,7 +153,7 @@ class DividedService:
             fps=FPS,
             ids=config.person_numbers,
         )
-        self._area = area_to_take_in(config, grounds)
+        self._area = ingest_area(config, grounds)
         state_replication = StateReplication(
             self.people, self.cameras, FPS, lambda _camera, _payload: None, clock=lambda: 0.0
         )
@@ -169,7 +169,7 @@ class DividedService:
         epoch = Epoch(number, (number + 1) * STRIDE - 1, tracks)
         began = time.process_time()
         if self._area is not None:
-            epoch = self._area.near(epoch)
+            epoch = self._area.without_far_people(epoch)
         self.people.update(epoch)
         self._replication.step(epoch)
         self.people.forget_before((number - _KEPT_EPOCHS) * STRIDE)

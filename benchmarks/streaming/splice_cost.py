@@ -21,10 +21,10 @@ from server.service.streaming.frame_buffer import FrameBuffer
 from server.service.streaming.splicer import Splicer
 from server.service.streaming.subscriber_queue import Chunk
 from server.service.view_selection.decider import GopDecision, ObjectChoice
-from server.service.view_selection.explanation import SelectionReasons
+from server.service.view_selection.explanation import GopExplanation
 
 _NAMES = tuple(f"c{number}" for number in range(CAMERAS))
-_NO_REASON = cast("SelectionReasons", None)
+_NO_REASON = cast("GopExplanation", None)
 _US = 1e6
 
 

@@ -21,7 +21,7 @@ from server.service.calibration.walk_session import WalkSession
 from server.service.decision_files.live_decision_writer import LiveDecisionWriter, open_decision_files
 from server.service.decision_state import DecisionState
 from server.service.deletion.recording_deletion import RecordingDeletion
-from server.service.identity.service_area import area_to_take_in
+from server.service.identity.service_area import ingest_area
 from server.service.identity.state_replication import SNAPSHOT_WAIT_S, StateReplication
 from server.service.ingest.backlog import BacklogMonitor
 from server.service.ingest.epoch_aligner import Epoch, EpochAligner
@@ -94,7 +94,7 @@ class BestViewPipeline:
         self.decider = ViewDecider(
             config, camera_homographies(config), lambda camera, pulse: self.frame_buffers[camera].has(pulse)
         )
-        self._area = area_to_take_in(config, camera_homographies(config))
+        self._area = ingest_area(config, camera_homographies(config))
         self.joint = JointWorker(config)
         self.decision_state = DecisionState(fps)
         people = self.decider.people
@@ -235,7 +235,7 @@ class BestViewPipeline:
 
     def _next_epoch(self) -> Epoch | None:
         epoch = self.aligner.take_next_ready(self.pulses.newest)
-        return epoch if epoch is None or self._area is None else self._area.near(epoch)
+        return epoch if epoch is None or self._area is None else self._area.without_far_people(epoch)
 
     def apply_live_view_settings(self, view: ViewSettings) -> None:
         """Select views by other settings from the next GOP on, as far as they can change at run time.

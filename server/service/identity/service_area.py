@@ -40,14 +40,14 @@ class ServiceArea:
         self._margin = area.margin
         self._homographies, self._site_size = homographies, site_size
 
-    def near(self, epoch: Epoch) -> Epoch:
+    def without_far_people(self, epoch: Epoch) -> Epoch:
         """Return an epoch without people who are beyond the margin around the floor."""
         if self._floor is None:
             return epoch
         return replace(
             epoch,
-            tracks={camera: self._near(message) for camera, message in epoch.tracks.items()},
-            late_revisions=tuple(map(self._near, epoch.late_revisions)),
+            tracks={camera: self._near_tracks(message) for camera, message in epoch.tracks.items()},
+            late_revisions=tuple(map(self._near_tracks, epoch.late_revisions)),
         )
 
     def votes(self, message: CameraTracks) -> list[bool]:
@@ -61,7 +61,7 @@ class ServiceArea:
             for distance in self._distances(message).tolist()
         ]
 
-    def _near(self, message: CameraTracks) -> CameraTracks:
+    def _near_tracks(self, message: CameraTracks) -> CameraTracks:
         matrix = self._homographies.get(message.camera)
         if matrix is None:
             return message
@@ -98,7 +98,7 @@ class ServiceArea:
         return np.asarray(np.hypot(*np.maximum(np.maximum(lower - places, places - upper), 0.0).T))
 
 
-def area_to_take_in(config: Config, homographies: Mapping[str, Floats | None]) -> ServiceArea | None:
+def ingest_area(config: Config, homographies: Mapping[str, Floats | None]) -> ServiceArea | None:
     """Return the area beyond which a service takes in nobody; None: it takes in whom its cameras see.
 
     Where viewers may see people pixelated only, everybody in a picture must be known.

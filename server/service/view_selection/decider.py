@@ -18,7 +18,7 @@ from server.service.identity.person_tracker import PersonTracker
 from server.service.identity.sharding import create_sharding
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.view_selection.current_shots import CurrentShots
-from server.service.view_selection.explanation import SelectionReasons
+from server.service.view_selection.explanation import GopExplanation
 from server.service.view_selection.lookahead_window import LookaheadSettings, LookaheadWindow
 from server.service.view_selection.mode_selection import ModeSelection
 from server.service.view_selection.recent_views import RecentViews
@@ -71,7 +71,7 @@ class GopDecision:
     """All merged numbers so far, with the numbers that were kept."""
     corrections: tuple[Merge | Split, ...]
     """Merges and splits since the last decision."""
-    reasons: SelectionReasons = field(compare=False, repr=False)
+    reasons: GopExplanation = field(compare=False, repr=False)
     """The costs behind the choices."""
     pictures: Mapping[str, PictureState] = field(default_factory=dict, compare=False, repr=False)
     """By camera, of those that have sent the last frame."""
@@ -253,7 +253,7 @@ class ViewDecider:
                 part.numbers.tolist(), views.tolist(), before.cameras.tolist(), strict=True
             )
         )
-        reasons = SelectionReasons(part, before.cameras, weight, self.switch_cost, self._config.view.quality)
+        reasons = GopExplanation(part, before.cameras, weight, self.switch_cost, self._config.view.quality)
         return GopDecision(
             first,
             frames,

@@ -53,7 +53,7 @@ class ViewCostExplanation:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SelectionReasons:
+class GopExplanation:
     """The costs by which the views of one GOP were selected.
 
     Attributes:

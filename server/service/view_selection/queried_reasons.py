@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from server.service.view_selection.decider import ObjectChoice
-from server.service.view_selection.explanation import SelectionReasons, ViewCostExplanation
+from server.service.view_selection.explanation import GopExplanation, ViewCostExplanation
 
 _QUERY_EXPIRY_S = 30.0
 """Reasons are no longer kept for a person not queried for so long."""
@@ -47,9 +47,9 @@ class QueriedReasons:
         self._reasons: dict[int, list[SelectionReason]] = {}
         """By object, in order."""
         self._newest = 0
-        self._newest_reasons: SelectionReasons | None = None
+        self._newest_reasons: GopExplanation | None = None
 
-    def put(self, selected_views: Mapping[int, SelectedView], first: int, reasons: SelectionReasons) -> None:
+    def put(self, selected_views: Mapping[int, SelectedView], first: int, reasons: GopExplanation) -> None:
         """Add the GOP that begins at `first`."""
         if first < self._newest:  # the pulses have restarted
             self._queried, self._reasons = {}, {}
@@ -92,7 +92,7 @@ class QueriedReasons:
         view = reasons[place].view
         return reasons[place] if pulse < view.first + view.frames else None
 
-    def _keep(self, view: SelectedView, reasons: SelectionReasons) -> SelectionReason:
+    def _keep(self, view: SelectedView, reasons: GopExplanation) -> SelectionReason:
         reason = SelectionReason(view, reasons.of(view.choice.number))
         oldest = view.first - self._keep_frames
         recent = [

@@ -32,14 +32,14 @@ from server.messaging.packed_arrays import PackedHistogram, pack_boxes, pack_his
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.pipeline import BestViewPipeline
 from server.service.streaming.frame_buffer import FrameBuffer
-from server.service.view_selection.explanation import SelectionReasons
+from server.service.view_selection.explanation import GopExplanation
 
 WIDTH, HEIGHT, FPS = 64, 48, 25
 GOP = STRIDE = 5
 CAMERAS = ("c0", "c1")
 SMALL: Box = (10.0, 10.0, 16.0, 28.0)
 LARGE: Box = (20.0, 4.0, 36.0, 44.0)
-NO_REASON = cast("SelectionReasons", None)
+NO_REASON = cast("GopExplanation", None)
 """The reasons of invented decisions, which no test reads."""
 
 

@@ -8,9 +8,9 @@ from bestview import Merge, Split
 from server.messaging.messages import PersonMerge, PersonSplit, ViewCut
 from server.service.decision_state import DecisionState
 from server.service.view_selection.decider import GopDecision, ObjectChoice
-from server.service.view_selection.explanation import SelectionReasons, ViewCostExplanation
+from server.service.view_selection.explanation import GopExplanation, ViewCostExplanation
 
-_UNTOLD = cast("SelectionReasons", None)
+_UNTOLD = cast("GopExplanation", None)
 
 
 class Counted:
@@ -40,7 +40,7 @@ def decided(state: DecisionState, first: int, numbers: tuple[int, ...] = (1, 2))
     """Add a GOP of ten frames; return its reasons."""
     choices = tuple(ObjectChoice(number, "c0", "c0", departed=False) for number in numbers)
     why = Counted()
-    state.put(GopDecision(first, 10, choices, {}, {7: 1}, (), cast("SelectionReasons", why)))
+    state.put(GopDecision(first, 10, choices, {}, {7: 1}, (), cast("GopExplanation", why)))
     return why
 
 

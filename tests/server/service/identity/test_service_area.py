@@ -20,7 +20,7 @@ from server.http.app import make_app, serving
 from server.messaging.messages import CameraTracks
 from server.messaging.observations import FrameObservations, unpack_observations
 from server.messaging.packed_arrays import pack_detections, pack_histograms
-from server.service.identity.service_area import ServiceArea, area_to_take_in
+from server.service.identity.service_area import ServiceArea, ingest_area
 from server.service.identity.sharding import OtherArea, ShardingByArea, TracksOfPeople
 from server.service.service import BestViewService
 from server.system.errors import UserError
@@ -65,7 +65,7 @@ def test_people_beyond_the_margin_are_not_taken_in() -> None:
         histograms=pack_histograms(np.eye(3)),
     )
     message = msgspec.structs.replace(seen("c0", 0, 50.0, 119.0, 121.0, 300.0), observations=[found])
-    near = area.near(epoch_of(0, message)).tracks["c0"]
+    near = area.without_far_people(epoch_of(0, message)).tracks["c0"]
     assert [track.id for track in near.tracks] == [1, 2]
     kept = unpack_observations(near.observations[0])
     assert kept.scores == pytest.approx([0.5, 0.6], abs=1e-6)
@@ -75,8 +75,8 @@ def test_people_beyond_the_margin_are_not_taken_in() -> None:
 def test_hidden_people_and_those_of_uncalibrated_cameras_are_taken_in() -> None:
     area = ServiceArea(share(0), {"c0": GROUND, "c1": None}, SIZE)
     hidden = camera_tracks("c0", 0, {1: None})
-    assert len(area.near(epoch_of(0, hidden)).tracks["c0"].tracks) == 1
-    assert len(area.near(epoch_of(0, seen("c1", 0, 600.0))).tracks["c1"].tracks) == 1
+    assert len(area.without_far_people(epoch_of(0, hidden)).tracks["c0"].tracks) == 1
+    assert len(area.without_far_people(epoch_of(0, seen("c1", 0, 600.0))).tracks["c1"].tracks) == 1
 
 
 class TwoAreas:
@@ -169,7 +169,7 @@ def test_a_service_takes_in_the_cameras_zones_and_rules_of_its_area() -> None:
     assert [zone.id for zone in own.zones] == [rule.id for rule in own.rules] == ["here"]
     assert own.of_service() is own
     assert (own.person_numbers.index, own.person_numbers.step) == (0, 2)
-    assert area_to_take_in(own, {}) is None
+    assert ingest_area(own, {}) is None
     assert small_config().of_service().camera_ids == CAMERAS
 
 
