@@ -102,7 +102,7 @@ def make_app(
     for slots in (VIEWER_SLOTS, EVENT_SLOTS, SEARCH_SLOTS, RENDER_SLOTS):
         app[slots] = FairShare()
     app[HLS_SESSIONS] = HlsSessions(service.streams.segment_plan.target_s, app[VIEWER_SLOTS])
-    app[WHEP_SESSIONS] = WhepSessions()
+    app[WHEP_SESSIONS] = WhepSessions(service.config.site.fps, app[TRAFFIC])
     app[openapi.DESCRIPTION] = openapi.ApiDescription(app)
     config = service.config
     authenticator = Authenticator(

@@ -11,9 +11,14 @@ from server.http.access.authorization import ACCESS, is_scoped_to_person
 from server.http.app_keys import SERVICE
 from server.http.json_responses import error_response, unavailable
 from server.http.streams.request_validation import refuse_live_if_scoped, requested_delay
-from server.http.streams.whep_sessions import HOW_TO_INSTALL, WHEP_SESSIONS, NoWebRtcError, WhepSession
+from server.http.streams.whep_sessions import (
+    HOW_TO_INSTALL,
+    WHEP_SESSIONS,
+    NoWebRtcError,
+    WhepSession,
+    reveal_viewer,
+)
 from server.http.viewers.fair_share import Slot
-from server.http.viewers.traffic import TRAFFIC
 from server.http.viewers.viewer_limits import (
     VIEWER_SLOTS,
     evict_or_refuse_viewer,
@@ -74,7 +79,7 @@ async def _begin(
     )
     if refused is not None:
         return refused
-    access, slots, service = request.app[ACCESS], request.app[VIEWER_SLOTS], request.app[SERVICE]
+    access, slots = request.app[ACCESS], request.app[VIEWER_SLOTS]
     client, permitted = access.client_of(request), access.follow(request)
 
     @contextlib.contextmanager
@@ -89,19 +94,13 @@ async def _begin(
     offer = (await request.read()).decode("utf-8", "replace")
     try:
         session, answer = await request.app[WHEP_SESSIONS].answer(
-            offer,
-            channel,
-            service.config.site.fps,
-            request.app[TRAFFIC],
-            request.path,
-            request.remote or "",
-            holding,
+            reveal_viewer(offer, request.remote or ""), channel, request.path, holding
         )
     except NoWebRtcError:
         return error_response(501, HOW_TO_INSTALL)
     except UserError as error:
         return error_response(400, str(error))
-    headers = {"Location": session.address, "Access-Control-Expose-Headers": "Location", **_HEADERS}
+    headers = {"Location": session.path, "Access-Control-Expose-Headers": "Location", **_HEADERS}
     return web.Response(status=201, text=answer, content_type=_SDP, headers=headers)
 
 

@@ -90,12 +90,12 @@ class WhepSession:
     """One viewer's session.
 
     Attributes:
-        id: the last part of its address; unguessable.
-        address: its path, by which it is ended.
+        id: the last part of its path; unguessable.
+        path: of its address, by which it is ended.
     """
 
     id: str
-    address: str
+    path: str
     connection: Any
     ended: asyncio.Event = field(default_factory=asyncio.Event)
 
@@ -122,36 +122,31 @@ class WhepSession:
 
 
 class WhepSessions:
-    """The sessions of a service, by id."""
+    """The sessions of a service, by id; ``traffic`` counts what is sent at the site's rate."""
 
-    def __init__(self) -> None:
+    def __init__(self, fps: float, traffic: Traffic) -> None:
+        self._fps, self._traffic = fps, traffic
         self._sessions: dict[str, WhepSession] = {}
         self._tasks: set[asyncio.Task[None]] = set()
 
-    def find(self, session_id: str, address: str) -> WhepSession | None:
-        """Return a session by its id and address; None: there is none."""
+    def find(self, session_id: str, path: str) -> WhepSession | None:
+        """Return a session by its id and path; None: there is none."""
         session = self._sessions.get(session_id)
-        return session if session is not None and session.address == address else None
+        return session if session is not None and session.path == path else None
 
     async def answer(
         self,
         offer: str,
         channel: Broadcaster,
-        fps: float,
-        traffic: Traffic,
         path: str,
-        address: str,
         holding: Callable[[WhepSession], contextlib.AbstractContextManager[None]],
     ) -> tuple[WhepSession, str]:
         """Begin a session for an SDP offer; return it and the SDP answer.
 
         Args:
-            offer: of the viewer, who receives one video.
+            offer: of the viewer, who receives one video; see `reveal_viewer`.
             channel: what is sent.
-            fps: the site's rate.
-            traffic: counts what is sent.
             path: of the stream's WHEP address.
-            address: of the viewer; empty: unknown.
             holding: entered while the session lasts.
 
         Raises:
@@ -160,12 +155,12 @@ class WhepSessions:
         """
         webrtc = await load_webrtc()
         viewer = channel.subscribe()
-        traffic.join(viewer)
+        self._traffic.join(viewer)
         try:
-            track = webrtc.EncodedTrack(timed_packets(viewer, fps, traffic))
-            connection, text = await webrtc.answer_offer(reveal_viewer(offer, address), track)
+            track = webrtc.EncodedTrack(timed_packets(viewer, self._fps, self._traffic))
+            connection, text = await webrtc.answer_offer(offer, track)
         except BaseException:
-            traffic.leave(viewer)
+            self._traffic.leave(viewer)
             channel.unsubscribe(viewer)
             raise
         session_id = secrets.token_urlsafe(16)
@@ -181,7 +176,7 @@ class WhepSessions:
                 log.exception("a WebRTC session failed")
             finally:
                 del self._sessions[session_id]
-                traffic.leave(viewer)
+                self._traffic.leave(viewer)
                 channel.unsubscribe(viewer)
 
         task = asyncio.create_task(run(), name="webrtc")
