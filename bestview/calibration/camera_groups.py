@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -14,14 +14,14 @@ from bestview.calibration.bundle_adjustment import (
     adjust_bundle,
     estimate_foot_precision,
 )
-from bestview.calibration.camera_pairs import (
+from bestview.calibration.camera_pairs import align_pair
+from bestview.calibration.floor_agreement import mutual_matches
+from bestview.calibration.pair_search import (
     CameraHypotheses,
     PairAlignment,
-    align_pair,
     compare_samples,
     comparison_pulses,
 )
-from bestview.calibration.floor_agreement import mutual_matches
 from bestview.calibration.pinhole import EAST, NORTH, PAN, POSE, Pinhole
 from bestview.calibration.samples import WalkSamples, candidate_matches, sample_walk
 from bestview.calibration.single_camera import fit_tilt_and_height
@@ -43,27 +43,7 @@ class CameraPair:
         """Return why the two cannot be placed on one floor; None if they can."""
         if self.alignment is None:
             return "no person was tracked by both cameras at the same time"
-        return next(
-            (words for applies, words in _rejection_reasons(self.alignment, settings) if applies), None
-        )
-
-
-def _rejection_reasons(alignment: PairAlignment, settings: WalkSettings) -> Iterator[tuple[bool, str]]:
-    """Yield the reasons against placing two cameras on one floor, and whether each applies."""
-    few = f"the cameras agree at only {alignment.places:.0f} places of the walk"
-    needed = f"{settings.minimum_places:.0f} are needed: walk longer where both see"
-    yield alignment.places < settings.minimum_places, f"{few}; {needed}"
-    enough = f"{100 * settings.minimum_share:.0f} % are needed"
-    share = f"they agree about only {100 * alignment.share:.1f} % of what both should see; {enough}"
-    yield alignment.share < settings.minimum_share, share
-    differs = f"their positions of the same people differ by {alignment.error:.2f} person heights (median)"
-    yield alignment.error > settings.maximum_error, f"{differs}: are feet hidden, or do people sit?"
-    yield (
-        alignment.merit < settings.minimum_over_chance * alignment.chance,
-        "they agree little better than by chance",
-    )
-    line = "the walk that both saw is a straight line: walk in curves and in several directions"
-    yield alignment.breadth < settings.minimum_breadth, line
+        return self.alignment.rejection(settings)
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,12 +38,14 @@ class WalkSettings:
     camera_height: float = 2.0
     camera_height_spread: float = 1.0
     # Two cameras are placed on one floor if they agree at this many places (`stride` apart), if this share of
-    # the samples that both could see is matched, and if they agree this many times as well as with the walk
-    # of one reversed in time or its halves swapped.
+    # the samples that both could see is matched, if they agree this many times as well as with the walk of
+    # one reversed in time or its halves swapped, and if this share of their agreement in each quarter of the
+    # walk is left with the alignment that the other three give.
     minimum_places: float = 12.0
     stride: float = 0.15
     minimum_share: float = 0.45
     minimum_over_chance: float = 1.5
+    minimum_held_out: float = 0.33
     # Largest median distance between their positions of a person.
     maximum_error: float = 0.25
     # Standard deviation of the walk across its main direction, below which it is a straight line.

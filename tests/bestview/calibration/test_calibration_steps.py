@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from bestview import foot_covariance, to_ground
 from bestview.calibration import Walk, WalkSettings, WalkTrack, build_walk
 from bestview.calibration.bundle_adjustment import CameraRig, Correspondences, offset_standard_errors
-from bestview.calibration.camera_pairs import walk_breadth
 from bestview.calibration.floor_agreement import (
     mutual_matches,
     project_to_floor,
@@ -19,6 +18,7 @@ from bestview.calibration.floor_agreement import (
     whitened_differences,
 )
 from bestview.calibration.pair_hypotheses import propose_relative_poses
+from bestview.calibration.pair_search import walk_breadth
 from bestview.calibration.pinhole import Pinhole
 from bestview.calibration.samples import candidate_matches, sample_walk
 from bestview.calibration.walk_tracks import halves_swapped, time_reversed

@@ -59,7 +59,7 @@ def test_several_unidentified_people_and_a_ghost_calibrate_as_well() -> None:
 def test_calibration_is_deterministic() -> None:
     random = np.random.default_rng(9)
     given = walks(random, (WEST, SOUTH), [random_path(random, 120)], (0, 0))
-    brief = WalkSettings(maximum_offset=0, minimum_places=5.0, minimum_breadth=0.02)
+    brief = WalkSettings(maximum_offset=0, minimum_places=5.0, minimum_breadth=0.02, minimum_held_out=0.1)
     first, second = (calibrate_from_walks(given, brief, PERSON) for _ in range(2))
     for one, other in zip(first.cameras, second.cameras, strict=True):
         assert one.homography.tobytes() == other.homography.tobytes()
@@ -110,6 +110,36 @@ def test_different_people_are_refused() -> None:
         for name, camera in (("c0", WEST), ("c1", SOUTH))
     ]
     with pytest.raises(CalibrationError, match="c0 and c1"):
+        calibrate_from_walks(given, WalkSettings(maximum_offset=0))
+
+
+def test_people_who_only_for_a_while_walk_like_others_elsewhere_are_refused() -> None:
+    random = np.random.default_rng(5)
+    path, later = random_path(random, 400), random_path(random, 400)
+    alike = np.concatenate([path[:240], later[240:] - later[240] + path[240]])
+    given = [recorded_walk("c0", WEST, [path], random), recorded_walk("c1", SOUTH, [alike], random)]
+    with pytest.raises(CalibrationError, match="in a quarter of the walk they agree about only"):
+        calibrate_from_walks(given, WalkSettings(maximum_offset=0))
+
+
+def test_a_camera_that_was_turned_during_the_walk_is_refused() -> None:
+    random = np.random.default_rng(6)
+    path = random_path(random, 450)
+    turned = camera_at(1, -4.5, (1.0, 0.3), focal=0.7)
+    before, after = (recorded_walk("c1", camera, [path], random) for camera in (SOUTH, turned))
+    middle = 250
+    kept = [
+        WalkTrack(track.first_frame, track.boxes[: middle - track.first_frame])
+        for track in before.tracks
+        if track.first_frame < middle - 1
+    ]
+    kept += [
+        WalkTrack(max(middle, track.first_frame), track.boxes[max(0, middle - track.first_frame) :])
+        for track in after.tracks
+        if track.end_frame > middle + 1
+    ]
+    given = [recorded_walk("c0", WEST, [path], random), replace(before, tracks=tuple(kept))]
+    with pytest.raises(CalibrationError, match="in a quarter of the walk they agree about only"):
         calibrate_from_walks(given, WalkSettings(maximum_offset=0))
 
 
