@@ -30,7 +30,7 @@ class WindowSettings:
 
     length_s: float = 0.6  # M: seconds of a window; a frame is final length_s - stride_s later
     stride_s: float = 0.2  # s: seconds between two windows
-    min_frames: int = 10  # frames of a window at least, 3 or more: at low frame rates it is longer
+    min_frames: int = 6  # frames of a window at least, 3 or more: at low frame rates it is longer
     birth_s: float = 0.6  # seconds over which a new object is tested; at most the window
     birth_min_visible: float = 0.5  # share of these frames in which a new object must be detected
     birth_max_cost: float = 0.7  # largest mean cost per frame of its path: appearance, motion, confidence

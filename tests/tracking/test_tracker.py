@@ -143,6 +143,13 @@ def test_short_clutter_initiates_no_track() -> None:
     assert _ids(results) == {1}
 
 
+def test_at_two_frames_a_second_who_passes_within_two_seconds_is_tracked() -> None:
+    passing = WalkingPerson(20.0, 30.0, 20.0, 1, range(20, 24))
+    slow = OnlineTracker(WindowSettings(), CostSettings(), create_solver("columns"), 2.0)
+    found = final_boxes(track_all([detections_at([passing], frame, 1.0) for frame in range(40)], slow))
+    assert [frame for frame, boxes in found.items() if boxes] == list(passing.seen)
+
+
 def test_an_occluded_person_keeps_the_id() -> None:
     # They meet at frame 50; the further one is not detected while they overlap.
     front = WalkingPerson(100.0, 40.0, 2.0, 0)
