@@ -17,6 +17,8 @@ _DEVICE = re.compile(r"/dev/(video[0-9]{1,3}|v4l/by-(id|path)/[\w.:+-]{1,200})")
 _MAX_ADDRESS = 1000
 _MAX_LOGIN = 200
 _HELP = "enter an address such as rtsp://10.0.0.11/stream1, http://10.0.0.14/video.mjpeg or /dev/video0"
+_LOGIN = "its password has a character that ends the login: enter user and password in their own fields"
+_BRACKETS = "an IPv6 address stands in brackets: rtsp://[fe80::1]/stream1"
 _NAME_BREAKS = re.compile(r"[^A-Za-z0-9_-]+")
 _IDENTIFIER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
 _SERVICE = re.compile(r"bestview(-\d+)?")
@@ -91,13 +93,16 @@ def parse_address(text: str, user: str = "", password: str = "") -> CameraAddres
         raise UserError(f"user and password have at most {_MAX_LOGIN} printable characters")
     if _DEVICE.fullmatch(address):
         return CameraAddress(address)
-    if not address or len(address) > _MAX_ADDRESS or not address.isprintable() or " " in address:
+    if not address or len(address) > _MAX_ADDRESS:
         raise UserError(_HELP)
+    _check_login(address)
+    if not address.isprintable() or " " in address:
+        raise UserError(f"it has a space or an invisible character: write %20 for a space, or {_HELP}")
     try:
         parts = urlsplit(address)
         host, port = parts.hostname, parts.port
     except ValueError:
-        raise UserError(_HELP) from None
+        raise UserError(_HELP if _bare_ipv6(address) is None else _BRACKETS) from None
     if parts.scheme not in _SCHEMES or not host:
         raise UserError(_HELP)
     user = user or unquote(parts.username or "")
@@ -111,6 +116,24 @@ def parse_address(text: str, user: str = "", password: str = "") -> CameraAddres
     source = urlunsplit((parts.scheme, f"{login}{place}", path, parts.query.replace(PLACEHOLDER, ""), ""))
     options = {"rtsp_transport": "tcp"} if parts.scheme in _RTSP else {}
     return CameraAddress(source, password or None, options)
+
+
+def _check_login(address: str) -> None:
+    """Check that a login in an address ends where it seems to.
+
+    Raises:
+        UserError: a character of its password ends it earlier: the rest would be shown, as host and path.
+    """
+    _, scheme_end, rest = address.partition("://")
+    place = re.split(r"[/?#\s]", rest, maxsplit=1)[0]
+    host, colon, port = place.rpartition("@")[2].partition(":")
+    is_login = colon and ("." not in host or not port.isdecimal()) and not host.startswith("[")
+    if scheme_end and "@" in rest[len(place) :] and (is_login or "#" in rest):
+        raise UserError(_LOGIN)
+
+
+def _bare_ipv6(address: str) -> re.Match[str] | None:
+    return re.match(r"\w+://(?:[^@/]*@)?[0-9A-Fa-f]*:[0-9A-Fa-f]*:[0-9A-Fa-f:.%]*(?:/|$)", address)
 
 
 def address_of(camera: CameraSettings) -> CameraAddress:

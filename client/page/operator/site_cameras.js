@@ -1,11 +1,11 @@
 /** The cameras in the configuration file: added after a trial, renamed, removed. A restart brings them into force. */
 
-import { requestOperator, requestTrial } from '../shared/requests.js';
+import { requestOperator } from '../shared/requests.js';
 import { CameraSearch } from '../shared/camera_search.js';
 import { element, make, onClick, setChildren, setText } from '../shared/dom.js';
 
 /** @import {CameraTrial} from '../shared/api_types.js' */
-/** @import {ShowWait} from '../shared/requests.js' */
+/** @import {TrialAim} from '../shared/running_trials.js' */
 /** @import {SiteCamera} from './api_types.js' */
 /** @import {CameraTiles} from './camera_tiles.js' */
 /** @import {Section, ShowError} from './section.js' */
@@ -19,6 +19,7 @@ export class SiteCameras {
   #name = element('add-name');
   /** @type {Map<string, HTMLElement>} by camera, address and substream */
   #items = new Map();
+  #hasResumed = false;
 
   /**
    * @param {ShowError} showError
@@ -27,29 +28,37 @@ export class SiteCameras {
   constructor(showError, fileChanged) {
     this.showError = showError;
     this.fileChanged = fileChanged;
-    this.search = new CameraSearch(element('camera-search'), (trial, showWait) => this.#tryCamera(trial, showWait), showError);
+    this.search = new CameraSearch(
+      element('camera-search'),
+      { path: 'site_cameras', request: (trial) => this.#wanted(trial), took: (answer, aim) => this.#took(answer, aim) },
+      showError,
+    );
     this.#instead.addEventListener('change', () => (this.#name.disabled = this.#instead.value !== ''));
   }
 
   async load() {
     try {
       this.#show((await requestOperator('site_cameras')).cameras);
+      if (!this.#hasResumed) this.search.resume();
+      this.#hasResumed = true;
     } catch (error) {
       setText(this.#state, error instanceof Error ? error.message : '');
     }
   }
 
+  /** @param {CameraTrial} trial */
+  #wanted(trial) {
+    return { ...trial, name: this.#name.value.trim() || trial.name, camera: this.#instead.value };
+  }
+
   /**
-   * @param {CameraTrial} trial
-   * @param {ShowWait} showWait
-   * @returns {Promise<string>} what has become of it
+   * @param {{cameras: SiteCamera[], note: string}} answer
+   * @param {TrialAim} aim
+   * @returns {Promise<string>} what has become of the camera
    */
-  async #tryCamera(trial, showWait) {
-    const [camera, name] = [this.#instead.value, this.#name.value];
-    const wanted = { ...trial, name: name.trim() || trial.name, camera };
-    const { cameras, note } = await requestTrial('site_cameras', wanted, showWait);
+  async #took({ cameras, note }, { camera, name }) {
     this.#show(cameras);
-    if (this.#name.value === name) this.#name.value = ''; // else another one was entered meanwhile
+    if (this.#name.value.trim() === name) this.#name.value = ''; // else another one was entered meanwhile
     if (this.#instead.value === camera) this.#instead.value = '';
     this.#name.disabled = this.#instead.value !== '';
     await this.fileChanged();

@@ -2,20 +2,18 @@
 
 import { CameraSearch } from '../shared/camera_search.js';
 import { element, setText } from '../shared/dom.js';
-import { pause, requestOperator, requestTrial, untilAnswered } from '../shared/requests.js';
+import { pause, requestOperator, untilAnswered } from '../shared/requests.js';
 import { exchangeTokenInLink } from '../shared/sign_in.js';
 import { AddedCameras } from './added_cameras.js';
 import { SiteForm } from './site_form.js';
 
-/** @import {CameraTrial} from '../shared/api_types.js' */
-/** @import {ShowWait} from '../shared/requests.js' */
 /** @import {SetupState, WrittenSite} from './api_types.js' */
 
 const POLL_MS = 500;
 const TIMEOUT_MS = 3000;
 
 const added = new AddedCameras(show, showError);
-const search = new CameraSearch(element('camera-search'), addCamera, showError);
+const search = new CameraSearch(element('camera-search'), { path: 'setup/cameras', request: (trial) => trial, took: showAdded }, showError);
 const form = new SiteForm(started, showError);
 
 /** @param {unknown} error null: no error */
@@ -31,13 +29,9 @@ function show(state) {
   form.show(state);
 }
 
-/**
- * @param {CameraTrial} trial
- * @param {ShowWait} showWait
- * @returns {Promise<string>} what has become of it
- */
-async function addCamera(trial, showWait) {
-  show(await requestTrial('setup/cameras', trial, showWait));
+/** @param {SetupState} state */
+async function showAdded(state) {
+  show(state);
   return 'was added';
 }
 
@@ -67,6 +61,7 @@ async function enter() {
   try {
     await exchangeTokenInLink(showError);
     show(await untilAnswered(() => requestOperator('setup'), showError));
+    search.resume();
     await search.run();
   } catch (error) {
     showError(error);

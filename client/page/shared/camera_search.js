@@ -1,13 +1,24 @@
 /** Cameras found in the network, their streams, and addresses: what is chosen is tried. */
 
 import { element, make, onClick, setChildren, setText } from './dom.js';
-import { HttpError, requestOperator, requestTrial } from './requests.js';
+import { HttpError, followTrial, requestOperator, requestTrial } from './requests.js';
 import { TrialLines } from './trial_lines.js';
+import { forgetTrial, rememberTrial, runningTrials } from './running_trials.js';
 
 /** @import {ShowWait} from './requests.js' */
+/** @import {TrialAim} from './running_trials.js' */
 /** @import {CameraTrial, OfferedStream, OfferedStreams, SearchResult, SearchedCamera} from './api_types.js' */
 
 const SEARCH_TIMEOUT_MS = 30_000;
+
+/**
+ * What is done with cameras that are tried.
+ *
+ * @typedef {object} TrialTarget
+ * @property {string} path of the request, below api/operator/
+ * @property {(trial: CameraTrial) => CameraTrial & TrialAim} request its JSON
+ * @property {(answer: any, aim: TrialAim) => Promise<string>} took shows the answer; says what has become of the camera
+ */
 
 export class CameraSearch {
   #user = make('input', { id: 'camera-user', size: 14, maxLength: 200, autocomplete: 'off' });
@@ -23,11 +34,11 @@ export class CameraSearch {
 
   /**
    * @param {HTMLElement} place what is in it applies to every camera, and comes after the login
-   * @param {(trial: CameraTrial, showWait: ShowWait) => Promise<string>} tryCamera says what has become of a camera that sends pictures
+   * @param {TrialTarget} target
    * @param {(error: unknown) => void} showError of the sign-in
    */
-  constructor(place, tryCamera, showError) {
-    this.tryCamera = tryCamera;
+  constructor(place, target, showError) {
+    this.target = target;
     this.showError = showError;
     const [login, found, address] = [this.#loginForm(), make('ul', { id: 'found', className: 'found' }), this.#addressForm()];
     found.setAttribute('aria-label', 'Cameras found');
@@ -165,16 +176,41 @@ export class CameraSearch {
    * @returns {Promise<boolean>} whether it sends pictures
    */
   async #try(label, trial, trials) {
-    const shown = label.replace(/\/\/[^/]*@/, '//'); // a login that was pasted with the address
+    const shown = label.trim().replace(/\/\/.*@/, '//'); // a login that was pasted with the address
+    const wanted = this.target.request(trial);
+    const aim = { camera: wanted.camera, name: wanted.name };
+    let key = NaN;
+    const works = await this.#report(shown, trials, aim, (showWait) =>
+      requestTrial(this.target.path, wanted, showWait, (begun) => rememberTrial((key = begun), { shown, ...aim })),
+    );
+    forgetTrial(key);
+    return works;
+  }
+
+  /** Go on to report the trials that ran when this page was left or reloaded. */
+  resume() {
+    for (const { trial, shown, ...aim } of runningTrials()) {
+      void this.#report(shown, this.#trials, aim, (showWait) => followTrial({ trial, ahead: 0 }, showWait)).then(() => forgetTrial(trial));
+    }
+  }
+
+  /**
+   * @param {string} shown
+   * @param {TrialLines} trials
+   * @param {TrialAim} aim
+   * @param {(showWait: ShowWait) => Promise<any>} run
+   * @returns {Promise<boolean>} whether it sends pictures
+   */
+  async #report(shown, trials, aim, run) {
     const show = trials.begin(shown);
     show(`Trying ${shown}…`);
     try {
-      const became = await this.tryCamera(trial, (wait) => show(wait ? `${shown}: ${wait}` : `Trying ${shown}…`));
-      show(`${shown} sends pictures and ${became}.`, true);
+      const answer = await run((wait) => show(wait ? `${shown}: ${wait}` : `Trying ${shown}…`));
+      show(`${shown} sends pictures and ${await this.target.took(answer, aim)}.`, true);
       return true;
     } catch (error) {
       const why = this.#explain(error);
-      show(why.startsWith(shown) ? why : `${shown}: ${why}`, true);
+      show(`${shown}: ${why.replace(/^\w+:\/\/\S+: /, '')}`, true); // without the address, of which the server shows less
       return false;
     }
   }

@@ -54,12 +54,26 @@ export function requestOperator(name, method = 'GET', content, timeoutMs = OPERA
  * @param {string} name below api/operator/
  * @param {object} content the request's JSON
  * @param {ShowWait} showWait
+ * @param {(trial: number) => void} [begun] receives the key of a trial that is not over at once
  * @returns {Promise<any>}
  * @throws {HttpError} with the server's error message
  * @throws {Error} the server does not answer the first request
  */
-export async function requestTrial(name, content, showWait) {
-  let answer = await requestOperator(name, 'POST', content);
+export async function requestTrial(name, content, showWait, begun) {
+  const answer = await requestOperator(name, 'POST', content);
+  if (answer.ahead !== undefined) begun?.(answer.trial);
+  return followTrial(answer, showWait);
+}
+
+/**
+ * Wait for the result of a trial, after a first answer to it.
+ *
+ * @param {any} answer
+ * @param {ShowWait} showWait
+ * @returns {Promise<any>}
+ * @throws {HttpError} with the server's error message
+ */
+export async function followTrial(answer, showWait) {
   while (answer.ahead !== undefined) {
     const { trial, ahead } = answer;
     showWait(ahead ? `waiting for ${ahead} ${ahead > 1 ? 'trials' : 'trial'} before…` : '');

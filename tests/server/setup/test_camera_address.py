@@ -49,6 +49,34 @@ def test_what_is_no_camera_is_refused_with_examples(text: str) -> None:
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("rtsp://admin:p@ss:w/rd#?%@10.0.0.11/live", "its password has a character that ends the login"),
+        ("rtsp://admin:123#4@10.0.0.11/", "its password has a character that ends the login"),
+        ("rtsp://admin:12/3@10.0.0.11/live", "its password has a character that ends the login"),
+        ("rtsp://admin:s3 cret@10.0.0.11/live", "its password has a character that ends the login"),
+        ("rtsp://10.0.0.11/my stream", "it has a space or an invisible character: write %20"),
+        ("rtsp://10.0.0.11/live\u200b", "it has a space or an invisible character: write %20"),
+        ("rtsp://fe80::1/live", "an IPv6 address stands in brackets"),
+        ("rtsp://viewer:pass@2001:db8::12/live", "an IPv6 address stands in brackets"),
+        ("rtsp://::1", "an IPv6 address stands in brackets"),
+    ],
+)
+def test_what_is_wrong_with_an_address_is_said_without_its_password(text: str, error: str) -> None:
+    with pytest.raises(UserError, match=error) as refused:
+        parse_address(text)
+    for secret in ("ss:w", "123", "12/3", "s3 cret", "pass@"):
+        assert secret not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    "text", ["rtsp://10.0.0.11:554/user@home", "rtsp://u:p@10.0.0.11/x?mail=a@b", "rtsp://[::1]:554/a@b"]
+)
+def test_an_at_sign_in_the_path_belongs_to_it(text: str) -> None:
+    assert parse_address(text).with_password == text
+
+
 @given(st.text(max_size=60), st.text(max_size=10), st.text(max_size=10))
 def test_any_text_is_accepted_or_refused_in_one_line(text: str, user: str, password: str) -> None:
     refused = ""

@@ -20,8 +20,11 @@ from fakes.paths import AXE
 from fakes.programs import needs_chromium
 from fakes.service.scripted_cameras import encoded
 from fakes.setup.onvif_camera import FakeProfile, OnvifCamera, onvif_cameras
+from fakes.timeouts import PATIENCE
 from server.http.setup_app import serve_setup
+from server.setup import session, trial_messages
 from server.setup.session import SetupSession
+from server.setup.trial_messages import StreamRequest, StreamTrial, try_stream
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
 
@@ -52,19 +55,23 @@ async def setup_page(browser: Browser, folder: Path) -> AsyncIterator[Page]:
     assert errors == []
 
 
-@asynccontextmanager
-async def silent_camera() -> AsyncIterator[tuple[str, asyncio.Event]]:
-    """Serve an RTSP camera that says nothing until the event is set, and then hangs up."""
-    ends = asyncio.Event()
+LATE = "rtsp://127.0.0.1:9/live"
 
-    async def serve(_: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        await ends.wait()
-        writer.close()
 
-    server = await asyncio.start_server(serve, "127.0.0.1", 0)
-    yield f"rtsp://127.0.0.1:{server.sockets[0].getsockname()[1]}/live", ends
-    ends.set()
-    server.close()
+@pytest.fixture
+def answers(monkeypatch: pytest.MonkeyPatch) -> asyncio.Event:
+    """Hold the trial of the address LATE, at which there is no camera, until this event is set."""
+    is_set = asyncio.Event()
+
+    async def try_later(request: StreamRequest) -> StreamTrial:
+        if request.source == LATE:
+            await is_set.wait()
+        return await try_stream(request)
+
+    monkeypatch.setattr(session, "try_stream", try_later)
+    monkeypatch.setattr(trial_messages, "TRIAL_S", PATIENCE)
+    monkeypatch.setattr(trial_messages, "_QUERY_S", PATIENCE)
+    return is_set
 
 
 def camera() -> RtspCamera:
@@ -78,22 +85,24 @@ async def try_address(page: Page, address: str) -> None:
 
 
 async def test_each_address_that_is_tried_has_a_line_of_its_own(
-    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answers: asyncio.Event
 ) -> None:
     monkeypatch.setenv("MYVIEW_DISCOVERY", "127.0.0.1:9")
     with closing(camera()) as works:
-        async with silent_camera() as (silent, ends), setup_page(browser, tmp_path) as page:
+        async with setup_page(browser, tmp_path) as page:
             lines = page.get_by_role("list", name="Trials of addresses").locator("li")
-            await try_address(page, silent)
-            await expect(lines).to_have_text([f"Trying {silent}…"])
+            await try_address(page, LATE)
+            await expect(lines).to_have_text([f"Trying {LATE}…"])
             await try_address(page, works.url)
             added = f"{works.url} sends pictures and was added."
             await page.get_by_label("Or an address").fill("rtsp://10.0.0.7/typed-meanwhile")
-            await expect(lines).to_have_text([f"Trying {silent}…", added])
+            await expect(lines).to_have_text([f"Trying {LATE}…", added])
             name = page.get_by_label(re.compile("Name of the camera"))
             await name.fill("half-typ")
-            ends.set()
-            await expect(lines.first).to_have_text(re.compile("^rtsp://127.0.0.1:.*: cannot open this video"))
+            answers.set()
+            await expect(lines.first).to_have_text(
+                re.compile("^rtsp://127.0.0.1:9/.*: cannot open this video")
+            )
             await expect(lines.last).to_have_text(added)
             await expect(name).to_be_focused()
             await expect(name).to_have_value("half-typ")
@@ -106,38 +115,60 @@ async def test_each_address_that_is_tried_has_a_line_of_its_own(
 
 
 async def test_a_trial_of_a_found_camera_is_reported_at_that_camera_and_survives_a_search(
-    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answers: asyncio.Event
 ) -> None:
     pytest.importorskip("onvif", reason="needs onvif-zeep-async: the extra onvif")
     with closing(camera()) as works:
-        async with silent_camera() as (silent, ends):
-            cameras = [
-                OnvifCamera(name, [FakeProfile("main", url, 64, 48, 12)])
-                for name, url in (("door", silent), ("yard", works.url))
-            ]
-            with onvif_cameras(*cameras) as targets:
-                monkeypatch.setenv("MYVIEW_DISCOVERY", targets)
-                async with setup_page(browser, tmp_path) as page:
-                    for name in ("door", "yard"):
-                        item = page.locator("#found > li", has_text=name)
-                        ask = item.get_by_role("button", name=re.compile("Show its streams"))
-                        await ask.focus()
-                        await page.keyboard.press("Enter")
-                        await expect(item).to_contain_text("1 stream.")
-                        await expect(ask).to_be_focused()
-                        await page.keyboard.press("Tab")
-                        await page.keyboard.press("Enter")
-                        await expect(item.get_by_role("button", name=re.compile("Try main"))).to_be_focused()
-                    door, yard = (
-                        page.get_by_role("list", name=f"Trials of {name}").locator("li")
-                        for name in ("door", "yard")
-                    )
-                    await expect(yard).to_have_text("127.0.0.1 main sends pictures and was added.")
-                    await expect(door).to_have_text("Trying 127.0.0.1 main…")
-                    await page.get_by_role("button", name="Search the network").click()
-                    await expect(page.locator("#search-state")).to_have_text("2 found.")
-                    ends.set()
-                    await expect(door).to_contain_text("127.0.0.1 main: rtsp://127.0.0.1")
-                    await expect(yard).to_contain_text("was added.")
-                    if AXE.exists():
-                        assert await page_violations(page) == []
+        cameras = [
+            OnvifCamera(name, [FakeProfile("main", url, 64, 48, 12)])
+            for name, url in (("door", LATE), ("yard", works.url))
+        ]
+        with onvif_cameras(*cameras) as targets:
+            monkeypatch.setenv("MYVIEW_DISCOVERY", targets)
+            async with setup_page(browser, tmp_path) as page:
+                for name in ("door", "yard"):
+                    item = page.locator("#found > li", has_text=name)
+                    ask = item.get_by_role("button", name=re.compile("Show its streams"))
+                    await ask.focus()
+                    await page.keyboard.press("Enter")
+                    await expect(item).to_contain_text("1 stream.")
+                    await expect(ask).to_be_focused()
+                    await page.keyboard.press("Tab")
+                    await page.keyboard.press("Enter")
+                    await expect(item.get_by_role("button", name=re.compile("Try main"))).to_be_focused()
+                door, yard = (
+                    page.get_by_role("list", name=f"Trials of {name}").locator("li")
+                    for name in ("door", "yard")
+                )
+                await expect(yard).to_have_text("127.0.0.1 main sends pictures and was added.")
+                await expect(door).to_have_text("Trying 127.0.0.1 main…")
+                await page.get_by_role("button", name="Search the network").click()
+                await expect(page.locator("#search-state")).to_have_text(re.compile("found"))
+                answers.set()
+                await expect(door).to_contain_text("127.0.0.1 main: cannot open this video")
+                await expect(yard).to_contain_text("was added.")
+                if AXE.exists():
+                    assert await page_violations(page) == []
+
+
+async def test_a_trial_goes_on_and_is_reported_when_the_page_is_reloaded_or_left(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answers: asyncio.Event
+) -> None:
+    monkeypatch.setenv("MYVIEW_DISCOVERY", "127.0.0.1:9")
+    async with setup_page(browser, tmp_path) as page:
+        lines = page.get_by_role("list", name="Trials of addresses").locator("li")
+        await try_address(page, "rtsp://viewer:p@ss:w/rd#?%@127.0.0.1:9/live")
+        await expect(lines).to_have_text([re.compile(f"^{LATE}: its password has a character that ends")])
+        await try_address(page, f" {LATE} ")
+        await expect(lines.last).to_have_text(f"Trying {LATE}…")
+        await page.wait_for_function("Object.values(sessionStorage).join().includes('trial')")
+        await page.reload()
+        await expect(lines).to_have_text([f"Trying {LATE}…"])
+        await page.goto("about:blank")
+        await page.go_back()
+        await expect(lines).to_have_text([f"Trying {LATE}…"])
+        answers.set()
+        await expect(lines).to_have_text([re.compile(f"^{LATE}: cannot open this video")])
+        await page.reload()
+        await expect(page.locator("#search-state")).not_to_have_text("")
+        await expect(lines).to_have_count(0)
