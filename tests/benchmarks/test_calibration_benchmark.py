@@ -1,4 +1,4 @@
-"""The calibration benchmark: the overlap of two cameras by the ground truth."""
+"""The calibration benchmark: the overlap of two cameras by the ground truth, and a pair not to be aligned."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ import numpy as np
 import pytest
 
 from benchmarks.calibration.calibration_errors import camera_overlaps
-from tracking.motchallenge import MotRow, write_rows
+from benchmarks.common.public_detections import Recording, track
+from bestview.calibration import CalibrationError, calibrate_from_walks
+from server.cli.calibrate.walk_input import VideoFormat, walks_from_tracks
+from server.service.calibration.calibration_report import walk_settings
+from tracking.motchallenge import MotRow, read_rows, write_rows
 
 HEIGHT = 60.0
 
@@ -48,3 +52,19 @@ def test_no_plane_fits_feet_that_are_hidden_at_random(tmp_path: Path) -> None:
     write_truth(tmp_path, "b", range(80), feet + random.normal(0, HEIGHT, (80, 2)) * (0, 1) + (0, 200))
     residual = camera_overlaps(tmp_path, ("a", "b"), (640, 900))["a", "b"].residual
     assert residual > 0.2
+
+
+@pytest.mark.slow
+def test_people_with_hidden_feet_who_agree_in_one_aisle_are_refused(
+    shared_data: Path, tmp_path: Path
+) -> None:
+    tracks, fps, end = tmp_path / "tracks", 30.0, 1350
+    tracks.mkdir()
+    for camera in ("IP2", "IP5"):
+        files = [shared_data / "auditorium" / kind / f"{camera}.txt.gz" for kind in ("det", "gt")]
+        detected = tmp_path / f"{camera}.txt"
+        write_rows(detected, [row for row in read_rows(files[0]) if row.frame <= end])
+        write_rows(tracks / f"{camera}.txt", track(Recording(camera, detected, files[1], fps)))
+    walked = walks_from_tracks([tracks], VideoFormat((1920, 1080), fps))
+    with pytest.raises(CalibrationError, match="IP2 and IP5: in a quarter of the walk they agree about only"):
+        calibrate_from_walks(walked.walks, walk_settings(fps, 0.0))
