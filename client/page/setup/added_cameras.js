@@ -39,14 +39,20 @@ export class AddedCameras {
     });
     const remove = make('button', { type: 'button', textContent: 'Remove' });
     remove.setAttribute('aria-label', `Remove the camera at ${address}`);
-    onClick(remove, async () => void (await this.#request(`setup/cameras/${key}`, 'DELETE')));
-    return make(
+    onClick(remove, async () => {
+      const { nextElementSibling: next, previousElementSibling: previous } = tile;
+      if (!(await this.#request(`setup/cameras/${key}`, 'DELETE'))) return;
+      (next ?? previous)?.querySelector('input')?.focus(); // the keyboard's focus was on what is gone
+      if (!next && !previous) element('address').focus();
+    });
+    const tile = make(
       'li',
       { className: 'camera-tile added-camera' },
       make('div', { className: 'still' }, picture),
       make('p', { className: 'buttons' }, field, remove),
       make('p', { className: 'quiet', textContent: `${sends}${tracked && `, people tracked in ${tracked}`} · ${address}` }),
     );
+    return tile;
   }
 
   /**
@@ -60,6 +66,7 @@ export class AddedCameras {
       this.update(await requestOperator(path, method, content));
       return true;
     } catch (error) {
+      await requestOperator('setup').then(this.update, () => {}); // another page may have changed it
       this.showError(error);
       return false;
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import socket
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from urllib.parse import urlsplit
@@ -54,7 +55,7 @@ def open_video(
     Raises:
         UserError: it cannot be opened, or there is no video in it.
     """
-    name = redact_to_host(source)
+    name, began = redact_to_host(source), time.monotonic()
     try:
         container = av.open(
             source,
@@ -64,6 +65,8 @@ def open_video(
         )
     except (av.error.FFmpegError, OSError, ValueError) as error:
         reason = timeout_message(error, timeout[0]) if timeout else None
+        if timeout and time.monotonic() - began >= timeout[0]:
+            reason = _no_answer(timeout[0])  # whatever FFmpeg makes of its interruption
         # FFmpeg's text contains the address, and so would a chained traceback.
         raise UserError(f"{name}: cannot open this video: {reason or _reason(source, error)}") from None
     if container.format.name == _TEXT:
@@ -90,7 +93,11 @@ def open_video(
 
 def timeout_message(error: Exception, seconds: float) -> str | None:
     """Return the error text for a timeout of ``seconds``; None for other errors."""
-    return f"no answer within {seconds:g} s" if isinstance(error, av.error.ExitError) else None
+    return _no_answer(seconds) if isinstance(error, av.error.ExitError) else None
+
+
+def _no_answer(seconds: float) -> str:
+    return f"no answer within {seconds:g} s"
 
 
 def _reason(source: str, error: Exception) -> str:

@@ -172,3 +172,31 @@ async def test_a_trial_goes_on_and_is_reported_when_the_page_is_reloaded_or_left
         await page.reload()
         await expect(page.locator("#search-state")).not_to_have_text("")
         await expect(lines).to_have_count(0)
+
+
+async def test_the_keyboard_goes_on_after_a_removal_and_another_pages_change_is_shown(
+    browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, answers: asyncio.Event
+) -> None:
+    del answers  # trials are waited for
+    monkeypatch.setenv("MYVIEW_DISCOVERY", "127.0.0.1:9")
+    with closing(camera()) as first, closing(camera()) as second:
+        async with setup_page(browser, tmp_path) as page:
+            names = page.get_by_label(re.compile("Name of the camera"))
+            for count, works in enumerate((first, second), 1):
+                await try_address(page, works.url)
+                await expect(names).to_have_count(count)
+            await page.evaluate(
+                """() => fetch('api/operator/setup/cameras/1',
+                    { method: 'DELETE', headers: { 'X-MyView-Changes': '1' } })"""
+            )
+            await names.first.fill("gone")
+            await page.keyboard.press("Tab")
+            await expect(page.locator("#error-message")).to_have_text("no such camera")
+            await expect(names).to_have_count(1)
+            await try_address(page, first.url)
+            await expect(names).to_have_count(2)
+            for left in (names.first, page.get_by_label("Or an address")):
+                await page.get_by_role("button", name=re.compile("Remove")).last.focus()
+                await page.keyboard.press("Enter")
+                await expect(left).to_be_focused()
+            await expect(names).to_have_count(0)

@@ -398,3 +398,12 @@ def test_an_unknown_host_is_distinguished_from_a_failing_camera(monkeypatch: pyt
     monkeypatch.setattr(socket, "getaddrinfo", unknown)
     with pytest.raises(UserError, match=r"rtsp://gate/\.\.\.: .*: Name or service not known"):
         open_video("rtsp://me:hunter2@gate/live")
+
+
+@pytest.mark.parametrize("scheme", ["rtsp", "http"])
+def test_a_camera_that_accepts_and_keeps_silent_does_not_answer(scheme: str) -> None:
+    """FFmpeg calls its interrupted RTSP request invalid data."""
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"{scheme}://127.0.0.1:{silent.getsockname()[1]}/live"
+        with pytest.raises(UserError, match=r"cannot open this video: no answer within 0\.3 s$"):
+            open_video(address, timeout=(0.3, 0.3))
