@@ -45,7 +45,7 @@ class WalkSettings:
     stride: float = 0.15
     minimum_share: float = 0.45
     minimum_over_chance: float = 1.5
-    minimum_held_out: float = 0.33
+    minimum_held_out: float = 0.5
     # Largest median distance between their positions of a person.
     maximum_error: float = 0.25
     # Standard deviation of the walk across its main direction, below which it is a straight line.
