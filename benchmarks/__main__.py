@@ -73,7 +73,7 @@ BENCHMARKS = (
     Benchmark("operator_assist.play", "the thesis's soccer clips on drawn play and real people; 10 minutes"),
     Benchmark("ablation", "tracking scores without each cost term; 15 minutes"),
     Benchmark("layout_gain", "what a layout term could gain, and one between companions does; 40 minutes"),
-    Benchmark("paper_experiments", "the paper's experiments, repeated on synthetic scenes; 45 minutes"),
+    Benchmark("paper_experiments", "the paper's experiments, repeated on synthetic scenes; 35 minutes"),
     Benchmark("rtsp", "clients of the RTSP gateway, and what one sees when processes die; 8 minutes"),
     Benchmark("live_cameras", "real-time tracking of four live cameras, cost by stage; 2 minutes"),
     Benchmark("endurance", "memory and time over 50 000 frames; 10 minutes"),

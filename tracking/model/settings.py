@@ -13,7 +13,7 @@ ConflictRows = Literal["clique", "star"]
 DisplacementUnit = Literal["pixels", "heights"]
 
 
-_JITTER, _SPEED, _TOP_SPEED = 0.05, 1.0, 2.5
+_JITTER, _SPEED, _TOP_SPEED = 0.1, 1.0, 2.5
 """Heights by which the box of somebody who stands changes from frame to frame; heights per second of somebody
 who walks, and who runs."""
 # Pixels: a smaller gate was probably meant in heights.
