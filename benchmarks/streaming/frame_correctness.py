@@ -38,12 +38,6 @@ class FrameCorrectness:
     ambiguous: int
     """Pulses at which two cameras have equal frames, so that a wrong frame would go unnoticed."""
 
-    @property
-    def all_correct(self) -> bool:
-        """Whether all frames are correct, and none is ambiguous."""
-        in_ts = self.frames if self.in_ts is None else self.in_ts
-        return self.in_file == in_ts == self.frames and not self.ambiguous
-
 
 def films(frames: int, seed: int, encode: EncodeSettings = _ENCODE) -> list[list[AccessUnit]]:
     """Encode pictures of random colors for each camera, all different."""

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from urllib.parse import quote, unquote, urlsplit, urlunsplit
 
 from server.config.camera_password import PLACEHOLDER
-from server.config.sections import CameraSettings
 from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
 
@@ -134,11 +133,6 @@ def _check_login(address: str) -> None:
 
 def _bare_ipv6(address: str) -> re.Match[str] | None:
     return re.match(r"\w+://(?:[^@/]*@)?[0-9A-Fa-f]*:[0-9A-Fa-f]*:[0-9A-Fa-f:.%]*(?:/|$)", address)
-
-
-def address_of(camera: CameraSettings) -> CameraAddress:
-    """Return a configured camera's address, without its password, which stays in its file."""
-    return CameraAddress(camera.source, None, dict(camera.options))
 
 
 def check_name(name: str) -> None:
