@@ -332,7 +332,8 @@ async def test_a_client_stays_when_somebody_walks_into_another_area(
             await more(frames, FPS)
             assert east.service.splicer.viewers == 0
             area.set_other_areas({1: OtherArea(1, 1_000_000, is_visible=True)})
-            monkeypatch.setattr(area, "hear", lambda _: None)  # and the other service says so from now on
+            # The other service says so from now on.
+            monkeypatch.setattr(area, "set_other_areas", lambda _: None)
             await until(lambda: east.service.splicer.viewers == 1)
             await more(frames, 2 * FPS)
             assert len(await frames_of(gateway.url("/objects/1", token_of("family")), 3)) == 3, "from there"
