@@ -30,7 +30,7 @@ export class SiteCameras {
     this.fileChanged = fileChanged;
     this.search = new CameraSearch(
       element('camera-search'),
-      { path: 'site_cameras', request: (trial) => this.#wanted(trial), took: (answer, aim) => this.#took(answer, aim) },
+      { path: 'site_cameras', request: (trial) => this.#wanted(trial), showResult: (answer, aim) => this.#showResult(answer, aim) },
       showError,
     );
     this.#instead.addEventListener('change', () => (this.#name.disabled = this.#instead.value !== ''));
@@ -56,7 +56,7 @@ export class SiteCameras {
    * @param {TrialAim} aim
    * @returns {Promise<string>} what has become of the camera
    */
-  async #took({ cameras, note }, { camera, name }) {
+  async #showResult({ cameras, note }, { camera, name }) {
     this.#show(cameras);
     if (this.#name.value.trim() === name) this.#name.value = ''; // else another one was entered meanwhile
     if (this.#instead.value === camera) this.#instead.value = '';

@@ -13,7 +13,7 @@ const POLL_MS = 500;
 const TIMEOUT_MS = 3000;
 
 const added = new AddedCameras(show, showError);
-const search = new CameraSearch(element('camera-search'), { path: 'setup/cameras', request: (trial) => trial, took: showAdded }, showError);
+const search = new CameraSearch(element('camera-search'), { path: 'setup/cameras', request: (trial) => trial, showResult: showAdded }, showError);
 const form = new SiteForm(started, showError);
 
 /** @param {unknown} error null: no error */

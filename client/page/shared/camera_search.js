@@ -17,7 +17,7 @@ const SEARCH_TIMEOUT_MS = 30_000;
  * @typedef {object} TrialTarget
  * @property {string} path of the request, below api/operator/
  * @property {(trial: CameraTrial) => CameraTrial & TrialAim} request its JSON
- * @property {(answer: any, aim: TrialAim) => Promise<string>} took shows the answer; says what has become of the camera
+ * @property {(answer: any, aim: TrialAim) => Promise<string>} showResult shows the answer; says what has become of the camera
  */
 
 export class CameraSearch {
@@ -206,7 +206,7 @@ export class CameraSearch {
     show(`Trying ${shown}…`);
     try {
       const answer = await run((wait) => show(wait ? `${shown}: ${wait}` : `Trying ${shown}…`));
-      show(`${shown} sends pictures and ${await this.target.took(answer, aim)}.`, true);
+      show(`${shown} sends pictures and ${await this.target.showResult(answer, aim)}.`, true);
       return true;
     } catch (error) {
       const why = this.#explain(error);

@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from server.http.access.permissions import Permission, permission_for
+from server.http.access.permissions import SESSION_PATH, Permission, permission_for
 from server.http.access.session_routes import SessionInfo
 from server.http.api.schema import Cameras, Delays, FlagList, Objects, Past, SiteInfo
 from server.http.json_responses import Problem
@@ -19,14 +19,13 @@ from server.service.facade.view_selection import ViewSelection
 
 SEARCH = "/api/past/search"
 RECORDED_SPANS = {"/api/objects/{object}/past", "/api/cameras/{camera}/past"}
-_SESSION = "/api/session"
 DELETION = "/api/operator/deletion"
 _CORRECTIONS = "/api/operator/position_corrections"
 _PEOPLE = "/api/operator/people"
 
 JSON_ANSWERS: dict[str, type[msgspec.Struct]] = {
     "/api/site": SiteInfo,
-    _SESSION: SessionInfo,
+    SESSION_PATH: SessionInfo,
     "/api/delays": Delays,
     "/api/objects": Objects,
     "/api/cameras": Cameras,
@@ -85,7 +84,7 @@ _UNAVAILABLE = {
 } | {
     path for path in MEDIA_TYPES if path.endswith((".webm", ".ts", ".m3u8", ".mjpeg", "best.jpg", "live.jpg"))
 }
-_NAMES_SOMETHING = {SEARCH, DELETION, _CORRECTIONS, _PEOPLE, *OPERATOR_RESULTS}
+_NOT_FOUND = {SEARCH, DELETION, _CORRECTIONS, _PEOPLE, *OPERATOR_RESULTS}
 """Paths whose query or body names a person, a camera or a zone, or whose file may not exist."""
 _VALIDATED = {SEARCH, *OPERATOR, *OPERATOR_FILES, *OPERATOR_RESULTS} | (
     OVERLAY | TIME_SHIFT | CAMERA_QUERY | DELAY | RECORDED_SPANS
@@ -130,7 +129,7 @@ def responses_of(path: str, method: str, *, has_json_body: bool) -> dict[str, An
         description = "It takes longer: ask /api/operator/setup/trials/{key} for the result."
         responses["202"] = {"description": description, "content": json_content(TrialProgress)}
     names = re.findall(r"\{(\w+)\}", path)
-    if names or path in _NAMES_SOMETHING:
+    if names or path in _NOT_FOUND:
         responses["404"] = {"description": "No object, camera or file of this name.", "content": error}
     if path in _VALIDATED or path.endswith("/choice") or has_json_body:
         responses["400"] = {"description": "Invalid request.", "content": error}
@@ -156,7 +155,7 @@ def _success(path: str, method: str) -> dict[str, Any]:
     """Return the responses to a valid request, and WHEP's errors."""
     error = json_content(Problem)
     content = json_content(JSON_ANSWERS[path]) if path in JSON_ANSWERS else {MEDIA_TYPES[path]: {}}
-    if (method, path) == ("DELETE", _SESSION):
+    if (method, path) == ("DELETE", SESSION_PATH):
         return {"204": {"description": "Signed out."}}
     if path.endswith("/trials/{key}"):
         return {

@@ -24,7 +24,11 @@ _Number = Annotated[int, msgspec.Meta(ge=1, le=PERSON_NUMBER_MAX)]
 
 DELETION_QUERIES = {
     "object": {"type": "integer", "minimum": 1, "maximum": PERSON_NUMBER_MAX},
-    "run": {"type": "string", "maxLength": _RUN_MAX, "description": "As in DeletionRequest."},
+    "run": {
+        "type": "string",
+        "maxLength": _RUN_MAX,
+        "description": "A recorded session whose numbers are others than today's.",
+    },
 }
 
 
