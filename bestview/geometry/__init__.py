@@ -13,6 +13,7 @@ from bestview.geometry.cross_view import (
 )
 from bestview.geometry.detection_probability import DetectionProbabilityMap
 from bestview.geometry.floor_areas import FloorAreas
+from bestview.geometry.floor_view import FloorView, overlapping_cameras
 from bestview.geometry.ground_plane import (
     camera_height,
     foot_covariance,
@@ -33,6 +34,7 @@ __all__ = [
     "CrossViewSettings",
     "DetectionProbabilityMap",
     "FloorAreas",
+    "FloorView",
     "boxes_touching_others",
     "camera_height",
     "estimate_bodies",
@@ -40,6 +42,7 @@ __all__ = [
     "foot_points",
     "ground_handedness",
     "horizon_row",
+    "overlapping_cameras",
     "person_heights",
     "project_boxes",
     "project_feet",

@@ -114,8 +114,9 @@ def rescore_detections(
 
 
 def views_overlap(own: CameraGeometry, other: CameraGeometry) -> bool:
-    """Return whether two cameras see common ground, within a margin.
+    """Return whether two cameras see any common ground, within a margin, so that one can confirm the other.
 
+    A single place is enough, while `FloorView.overlaps`, for joint tracking, needs a share of the floor.
     Tested on a grid over the camera's picture and a margin below it, as far as boxes may reach.
     """
     width, height = own.size

@@ -7,21 +7,13 @@ tree: Bentley, 1975). Every place is in exactly one area, also outside of all vi
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bestview.geometry.ground_plane import from_ground, pixel_steps, to_ground
+from bestview.geometry.floor_view import FloorView
 
 Floats = NDArray[np.float64]
-
-_GRID = 16
-"""Foot points per row and column of a picture."""
-_MAX_DISTANCE = 8.0
-"""How many times smaller than at the lower edge people may be in a picture: farther away nobody is found."""
-_MIN_SHARE = 0.1
-"""Share of the floor in a picture that another camera sees, from which on they see the same, in pixels."""
 
 
 class FloorAreas:
@@ -45,7 +37,7 @@ class FloorAreas:
         self._views = {
             camera: view
             for camera, matrix in homographies.items()
-            if matrix is not None and len((view := _FloorView.of(matrix, sizes[camera])).places)
+            if matrix is not None and len((view := FloorView.of(matrix, sizes[camera])).places)
         }
         self._others = [camera for camera in homographies if camera not in self._views]
         if count > 1 and len(self._views) < count:
@@ -86,60 +78,12 @@ class FloorAreas:
     def also_seen_by(self, area: int) -> tuple[str, ...]:
         """Return the cameras of other areas that see the same floor as one of an area, sorted."""
         own = set(self.cameras_of(area))
-        other = {camera: view.places for camera, view in self._views.items() if camera not in own}
         seeing = [
             camera
-            for camera, places in other.items()
-            if any(
-                max(
-                    self._views[one].sees(places).mean(),
-                    self._views[camera].sees(self._views[one].places).mean(),
-                )
-                >= _MIN_SHARE
-                for one in own & self._views.keys()
-            )
+            for camera, view in self._views.items()
+            if camera not in own and any(view.overlaps(self._views[one]) for one in own & self._views.keys())
         ]
         return tuple(sorted(seeing))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _FloorView:
-    """The floor in a picture, as far as people are large enough there to be found."""
-
-    homography: Floats
-    size: tuple[int, int]
-    places: Floats
-    """(K, 2) all over it, evenly in the picture."""
-
-    @classmethod
-    def of(cls, homography: Floats, size: tuple[int, int]) -> _FloorView:
-        """Return the view of a camera."""
-        columns, rows = np.meshgrid(*((np.arange(_GRID) + 0.5) / _GRID for _ in range(2)))
-        points = np.stack([columns.ravel() * size[0], rows.ravel() * size[1]], axis=1)
-        places = to_ground(homography, points[_is_close(homography, size, points)])
-        return cls(homography, size, places)
-
-    def sees(self, places: Floats) -> NDArray[np.bool_]:
-        """Return which of (K, 2) places are in it, (K,)."""
-        points = from_ground(self.homography, places)
-        with np.errstate(invalid="ignore"):
-            inside = ((points >= 0) & (points < np.array(self.size))).all(axis=1)
-        found = np.zeros(len(places), dtype=np.bool_)
-        found[inside] = _is_close(self.homography, self.size, points[inside])
-        return found
-
-
-def _is_close(homography: Floats, size: tuple[int, int], points: Floats) -> NDArray[np.bool_]:
-    """Return at which image points (K, 2) the floor is, and not too far."""
-    width, height = size
-    near = _sideways(homography, np.array([[width / 2.0, float(height)]]))[0]
-    with np.errstate(invalid="ignore"):
-        return np.asarray(_sideways(homography, points) < _MAX_DISTANCE * near)
-
-
-def _sideways(homography: Floats, points: Floats) -> Floats:
-    """Return how long a pixel to the right is on the ground at image points (K, 2), (K,); NaN: no floor."""
-    return np.asarray(np.hypot(*pixel_steps(homography, points)[..., 0].T))
 
 
 def _divide(centers: Floats, bounds: Floats, count: int) -> list[Floats]:

@@ -1,7 +1,6 @@
 """Joint tracking of everybody on a ground plane that several cameras see, by one network program."""
 
 from tracking.ground_plane.camera import GroundCamera
-from tracking.ground_plane.overlapping_views import overlapping_cameras
 from tracking.ground_plane.settings import GroundSettings
 from tracking.ground_plane.tracker import GroundPlaneTracker, track_ground_plane
 from tracking.ground_plane.tracks import GroundBox, GroundFrame, GroundTrack
@@ -13,6 +12,5 @@ __all__ = [
     "GroundPlaneTracker",
     "GroundSettings",
     "GroundTrack",
-    "overlapping_cameras",
     "track_ground_plane",
 ]

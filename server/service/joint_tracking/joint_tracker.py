@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bestview import FloorView, overlapping_cameras
 from server.media.letterbox import Letterbox
 from server.messaging.camera_status import PictureMotion
 from server.messaging.observations import unpack_observations
@@ -24,13 +25,7 @@ from server.service.joint_tracking.joint_messages import (
     JointTracks,
 )
 from tracking import Detections, SolverBudget, create_solver
-from tracking.ground_plane import (
-    GroundCamera,
-    GroundFrame,
-    GroundPlaneTracker,
-    GroundSettings,
-    overlapping_cameras,
-)
+from tracking.ground_plane import GroundCamera, GroundFrame, GroundPlaneTracker, GroundSettings
 
 
 class JointTracker:
@@ -41,6 +36,8 @@ class JointTracker:
         self._homographies = {camera: np.array(rows) for camera, rows in setup.homographies.items()}
         self._calibrations: dict[str, GroundCamera] = {}
         """Of the cameras that have reported."""
+        self._views: dict[str, FloorView] = {}
+        """What they see of the floor, as calibrated."""
         self._motions: dict[str, PictureMotion | None] = {}
         """How those cameras were knocked or turned."""
         self._covered: dict[str, PackedAreas] = {}
@@ -108,7 +105,8 @@ class JointTracker:
                 self._calibrations[camera] = calibration
                 self._tracker.set_camera(camera, calibration)
                 self._motions[camera], self._covered[camera] = None, b""
-                self._joint = overlapping_cameras(self._calibrations)
+                self._views[camera] = FloorView.of(self._homographies[camera], part.size)
+                self._joint = overlapping_cameras(self._views)
             self._turn(camera, part)
             (self._ended.add if part.ended else self._ended.discard)(camera)
         for camera, part in task.cameras.items():
