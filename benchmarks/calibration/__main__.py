@@ -27,13 +27,20 @@ from benchmarks.common.environment import CannotRunError, parser
 from benchmarks.common.public_detections import Recording, track
 from benchmarks.common.recorded_views import RecordedViews, find_views
 from benchmarks.common.report import Report
-from bestview.calibration import CalibrationError, Walk, WalkCalibration, WalkTrack, calibrate_from_walks
+from bestview.calibration import (
+    CalibrationError,
+    Walk,
+    WalkCalibration,
+    WalkSettings,
+    WalkTrack,
+    calibrate_from_walks,
+)
 from server.cli.calibrate.walk_input import VideoFormat, walks_from_tracks
 from server.cli.evaluate.track_scores import evaluate_recordings, read_recordings
 from server.cli.generated_config import config_for_videos
 from server.cli.render.renderer import render
 from server.cli.track.command import track_one
-from server.service.calibration.calibration_report import ground_file_text, walk_settings
+from server.service.calibration.calibration_report import ground_file_text
 from server.service.calibration.floor_plan import plot_floor_plan
 from server.service.calibration.floor_plan_camera import floor_plan_cameras
 from synthetic import Scene, write_recording
@@ -95,7 +102,7 @@ def room_rows(report: Report, folder: Path, out: Path) -> None:
         room = render_room(folder / f"room{people}", people)
         for name, walks in (("true boxes", room.from_boxes), ("MyView's tracks", room.from_tracks)):
             found = calibrate_from_walks(
-                [desynchronize(walk) for walk in walks], walk_settings(_ROOM_FPS, _SHIFT_S), _PERSON_M
+                [desynchronize(walk) for walk in walks], WalkSettings.at_rate(_ROOM_FPS, _SHIFT_S), _PERSON_M
             )
             errors = foot_point_errors(found, room.truth, [desynchronize(walk) for walk in walks])
             rows.append(
@@ -130,7 +137,7 @@ def terrace_rows(report: Report, data: Path, folder: Path, out: Path) -> None:
     size = (views.site["width"], views.site["height"])
     tracks = _tracked(views, folder / "terrace", settings)
     walked = walks_from_tracks([tracks], VideoFormat(size, views.site["fps"]))
-    found = calibrate_from_walks(walked.walks, walk_settings(walked.fps, _SHIFT_S), _PERSON_M)
+    found = calibrate_from_walks(walked.walks, WalkSettings.at_rate(walked.fps, _SHIFT_S), _PERSON_M)
     _plot(found, out / "calibration_terrace.png")
     estimated = folder / "terrace.json"
     estimated.write_text(
@@ -182,7 +189,7 @@ def auditorium_rows(report: Report, data: Path, folder: Path, out: Path) -> None
         recording = Recording(camera, detected, truth, _AUDITORIUM_FPS)
         write_rows(tracks / f"{camera}.txt", track(recording))
     walked = walks_from_tracks([tracks], VideoFormat(size, _AUDITORIUM_FPS))
-    found = calibrate_from_walks(walked.walks, walk_settings(walked.fps, 0.0), _PERSON_M)
+    found = calibrate_from_walks(walked.walks, WalkSettings.at_rate(walked.fps, 0.0), _PERSON_M)
     _plot(found, out / "calibration_auditorium.png")
     ground = folder / "auditorium.json"
     ground.write_text(ground_file_text("m", {camera.camera: camera.homography for camera in found.cameras}))

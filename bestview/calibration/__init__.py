@@ -10,7 +10,7 @@ from bestview.calibration.walk_calibration import (
     WalkCalibration,
     calibrate_from_walks,
 )
-from bestview.calibration.walk_settings import WalkSettings
+from bestview.calibration.walk_settings import WalkSettings, comparison_step
 from bestview.calibration.walk_tracks import Walk, WalkTrack, boxes_at_edge, build_walk
 
 __all__ = [
@@ -30,6 +30,7 @@ __all__ = [
     "boxes_at_edge",
     "build_walk",
     "calibrate_from_walks",
+    "comparison_step",
     "fit_cameras",
     "fit_homography",
     "fit_points",

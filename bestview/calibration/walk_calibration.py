@@ -83,7 +83,7 @@ class WalkCalibration:
 
 
 def calibrate_from_walks(
-    walks: Sequence[Walk], settings: WalkSettings | None = None, person_height: float = 1.75
+    walks: Sequence[Walk], settings: WalkSettings, person_height: float = 1.75
 ) -> WalkCalibration:
     """Calibrate cameras on common floors from the tracks of people who walked through their views.
 
@@ -95,7 +95,6 @@ def calibrate_from_walks(
     Raises:
         CalibrationError: no two cameras could be placed on one floor, or one agrees with none of its floor.
     """
-    settings = settings or WalkSettings()
     if len(walks) < 2:  # noqa: PLR2004 — two cameras
         raise CalibrationError("at least two cameras that see the same floor are needed")
     pairs = align_camera_pairs(walks, settings)

@@ -4,6 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
+_STEP_S = 0.2
+"""Seconds between the moments at which cameras are compared; people walk a sixth of their height in it."""
+_MAXIMUM_OFFSET_S = 3.0
+
+
+def comparison_step(fps: float) -> int:
+    """Return the frames between the moments that are compared, over which boxes are averaged."""
+    return max(1, round(_STEP_S * fps))
+
 
 @dataclass(frozen=True, slots=True)
 class WalkSettings:
@@ -16,9 +25,9 @@ class WalkSettings:
     """
 
     # Largest time offset between two cameras, frames; 0: they are synchronized.
-    maximum_offset: int = 75
+    maximum_offset: int
     # Frames between the pulses that are compared.
-    step: int = 5
+    step: int
     # Standard deviations of foot points: in box heights, and on the floor in person heights.
     foot_sideways: float = 0.05
     foot_upwards: float = 0.15
@@ -57,3 +66,8 @@ class WalkSettings:
             value = getattr(self, field.name)
             if not (value >= 0 if field.name == "maximum_offset" else value > 0):
                 raise ValueError(f"walk settings: {field.name}: {value} is not above 0")
+
+    @classmethod
+    def at_rate(cls, fps: float, maximum_offset_s: float = _MAXIMUM_OFFSET_S) -> WalkSettings:
+        """Return the settings at a frame rate, for cameras out of sync by at most so many seconds."""
+        return cls(round(maximum_offset_s * fps), comparison_step(fps))

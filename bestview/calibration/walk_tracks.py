@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bestview.calibration.homography import Floats
+from bestview.calibration.walk_settings import comparison_step
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,11 +68,11 @@ def build_walk(
     frames: Sequence[int],
     ids: Sequence[int],
     boxes: Floats,
-    averaging_frames: int = 5,
+    fps: float,
 ) -> Walk:
     """Build the walk of a camera from rows of detections, without boxes that the picture's edge cuts off.
 
-    Boxes are averaged over some frames, so that lifted feet do not count as movement.
+    Boxes are averaged over a moment, so that lifted feet do not count as movement.
 
     Args:
         camera: its name.
@@ -79,9 +80,10 @@ def build_walk(
         frames: (N,) the frame of each row.
         ids: (N,) the track of each row.
         boxes: (N, 4) left, top, right, bottom of each row in pixels.
-        averaging_frames: frames over which boxes are averaged, the `step` of `WalkSettings`. Longer gaps
-            split a track; the boxes of shorter ones are interpolated.
+        fps: frames a second. A gap longer than the `step` of `WalkSettings` splits a track; the boxes of
+            shorter ones are interpolated.
     """
+    averaging_frames = comparison_step(fps)
     frame, track_id = np.asarray(frames, dtype=np.intp), np.asarray(ids, dtype=np.intp)
     inside = ~boxes_at_edge(boxes, size)
     tracks = []

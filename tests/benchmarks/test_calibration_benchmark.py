@@ -10,9 +10,8 @@ import pytest
 
 from benchmarks.calibration.calibration_errors import camera_overlaps
 from benchmarks.common.public_detections import Recording, track
-from bestview.calibration import CalibrationError, calibrate_from_walks
+from bestview.calibration import CalibrationError, WalkSettings, calibrate_from_walks
 from server.cli.calibrate.walk_input import VideoFormat, walks_from_tracks
-from server.service.calibration.calibration_report import walk_settings
 from tracking.motchallenge import MotRow, read_rows, write_rows
 
 HEIGHT = 60.0
@@ -67,4 +66,4 @@ def test_people_with_hidden_feet_who_agree_in_one_aisle_are_refused(
         write_rows(tracks / f"{camera}.txt", track(Recording(camera, detected, files[1], fps)))
     walked = walks_from_tracks([tracks], VideoFormat((1920, 1080), fps))
     with pytest.raises(CalibrationError, match="IP2 and IP5: in a quarter of the walk they agree about only"):
-        calibrate_from_walks(walked.walks, walk_settings(fps, 0.0))
+        calibrate_from_walks(walked.walks, WalkSettings.at_rate(fps, 0.0))

@@ -41,10 +41,10 @@ def calibrate(
     ] = False,
 ) -> None:
     """Calibrate cameras to the floor: from marked points, or from people who walk about."""
+    from bestview.calibration import WalkSettings
     from server.cli.calibrate.calibration import calibrate_from_walks, calibrate_points
     from server.cli.calibrate.walk_input import VideoFormat, read_walks
     from server.cli.render.video_info import parse_size
-    from server.service.calibration.calibration_report import walk_settings
     from server.service.calibration.points_file import ENDINGS
 
     for path in inputs:
@@ -63,7 +63,7 @@ def calibrate(
             walked = read_walks(
                 inputs, config, picture, lambda name: typer.echo(f"tracking {name}", err=True)
             )
-            settings = walk_settings(walked.fps, shift)
+            settings = WalkSettings.at_rate(walked.fps, shift)
             lines = calibrate_from_walks(walked, ground, drawn, settings, person_height, force=force)
     for line in lines:
         typer.echo(line)

@@ -14,7 +14,7 @@ from bestview.calibration import Walk, build_walk
 from server.cli.generated_config import camera_name
 from server.cli.render.video_info import Size, read_video_info
 from server.cli.track.command import config_for_video, track_one
-from server.service.calibration.calibration_report import RecordedWalk, comparison_step
+from server.service.calibration.calibration_report import RecordedWalk
 from server.system.errors import UserError, reason_of
 from tracking.motchallenge import MotRow, read_rows
 
@@ -124,7 +124,7 @@ def _walk(name: str, size: Size, rows: Sequence[MotRow], fps: float, offset: int
     boxes = np.array([row.box for row in rows], dtype=np.float64).reshape(-1, 4)
     # Files count frames from 1, pulses from 0.
     frames = [row.frame - 1 - offset for row in rows]
-    return build_walk(name, size, frames, [row.id for row in rows], boxes, comparison_step(fps))
+    return build_walk(name, size, frames, [row.id for row in rows], boxes, fps)
 
 
 def _rows(path: Path, name: str | None = None) -> list[MotRow]:

@@ -8,13 +8,8 @@ import sys
 import msgspec
 import numpy as np
 
-from bestview.calibration import CalibrationError, Walk, build_walk
-from server.service.calibration.calibration_report import (
-    RecordedWalk,
-    calibrate_walk,
-    comparison_step,
-    walk_settings,
-)
+from bestview.calibration import CalibrationError, Walk, WalkSettings, build_walk
+from server.service.calibration.calibration_report import RecordedWalk, calibrate_walk
 from server.service.calibration.floor_plan import plot_floor_plan
 from server.service.calibration.floor_plan_camera import floor_plan_cameras
 from server.service.calibration.worker import CalibrationResult, CalibrationTask, CameraBoxes
@@ -27,7 +22,9 @@ def calibrate(task: CalibrationTask) -> CalibrationResult:
     without_offset = tuple(walk.camera for walk in walks if walk.camera not in task.offsets)
     recorded = RecordedWalk(walks, task.fps, offsets=task.offsets, without_offset=without_offset)
     try:
-        report = calibrate_walk(recorded, walk_settings(task.fps, task.max_offset_s), task.person_height)
+        report = calibrate_walk(
+            recorded, WalkSettings.at_rate(task.fps, task.max_offset_s), task.person_height
+        )
     except CalibrationError as error:
         return CalibrationResult(error=str(error))
     plan = io.BytesIO()
@@ -45,9 +42,7 @@ def calibrate(task: CalibrationTask) -> CalibrationResult:
 def _walk(camera: CameraBoxes, fps: float) -> Walk:
     frames, track = np.frombuffer(camera.frames, dtype=np.int64), np.frombuffer(camera.track, dtype=np.int64)
     boxes = np.frombuffer(camera.boxes, dtype=np.float64).reshape(-1, 4)
-    return build_walk(
-        camera.camera, camera.size, frames.tolist(), track.tolist(), boxes, comparison_step(fps)
-    )
+    return build_walk(camera.camera, camera.size, frames.tolist(), track.tolist(), boxes, fps)
 
 
 def main() -> None:

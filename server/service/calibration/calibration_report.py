@@ -17,9 +17,6 @@ from bestview.calibration import (
     calibrate_from_walks,
 )
 
-_MOMENT_S = 0.2
-"""Seconds between the moments at which cameras are compared; people walk a sixth of their height in it."""
-
 
 @dataclass(frozen=True, slots=True)
 class RecordedWalk:
@@ -40,16 +37,6 @@ class RecordedWalk:
     rate_guessed: bool = False
     offsets: Mapping[str, int] = field(default_factory=dict)
     without_offset: tuple[str, ...] = ()
-
-
-def walk_settings(fps: float, max_offset_s: float) -> WalkSettings:
-    """Return the settings for cameras that are out of sync by at most `max_offset_s` seconds."""
-    return WalkSettings(maximum_offset=round(max_offset_s * fps), step=comparison_step(fps))
-
-
-def comparison_step(fps: float) -> int:
-    """Return the frames between the moments at which cameras are compared."""
-    return max(1, round(_MOMENT_S * fps))
 
 
 def ground_file_text(

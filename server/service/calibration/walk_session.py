@@ -7,9 +7,9 @@ from collections.abc import Callable, Coroutine
 from enum import Enum
 from typing import Any
 
+from bestview.calibration import comparison_step
 from server.config.site_config import Config
 from server.config.source_address import SourceKind, source_kind
-from server.service.calibration.calibration_report import comparison_step
 from server.service.calibration.coverage import WalkCoverage, walk_coverage
 from server.service.calibration.walk_samples import CalibrationWalk
 from server.service.calibration.worker import CalibrationResult, CalibrationTask, run_calibration

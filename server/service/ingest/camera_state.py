@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime
 
 from server.messaging.camera_status import (
@@ -36,6 +36,8 @@ class Unavailability:
 class CameraState:
     """The state of a camera as the best-view service knows it."""
 
+    metrics: CameraMetrics
+    """Measurements for the operator."""
     alive: bool = False
     refused: str = ""
     """Why its frames are refused; empty: they are used."""
@@ -49,8 +51,6 @@ class CameraState:
     frames: int = 0
     frames_without_peers: int = 0
     """Frames that were tracked without another camera's detections."""
-    metrics: CameraMetrics = field(default_factory=CameraMetrics)
-    """Measurements for the operator."""
 
     @property
     def label(self) -> str:

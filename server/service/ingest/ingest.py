@@ -34,6 +34,7 @@ from server.messaging.messages import (
 from server.service.ingest.camera_state import CameraState, Unavailability
 from server.service.ingest.epoch_aligner import EpochAligner
 from server.service.ingest.validation import is_plausible
+from server.service.metrics.camera_metrics import CameraMetrics
 from server.service.streaming.audio_buffer import AudioBuffer
 from server.service.streaming.frame_buffer import DamagedFrameError, FrameBuffer
 
@@ -91,7 +92,10 @@ class Ingest:
             camera: RateLimit(_PRESENCE_LOG_BURST, _PRESENCE_LOG_RATE, time.monotonic())
             for camera in frame_buffers
         }
-        self.states = {camera: CameraState() for camera in frame_buffers}
+        self.states = {
+            camera: CameraState(CameraMetrics(frame_buffer.fps))
+            for camera, frame_buffer in frame_buffers.items()
+        }
         self._thumbnails: dict[str, OrderedDict[tuple[int, int], Thumbnail]] = {
             camera: OrderedDict() for camera in frame_buffers
         }

@@ -12,10 +12,12 @@ from prometheus_client import Histogram
 
 from server.messaging.messages import CameraTracks, FrameHeader
 from server.service.metrics.stage_timers import SECONDS_BUCKETS
+from tracking.frame_rate import frames_in
 
-_FRAMES = 250
-"""Recent frames that are measured: ten seconds at 25 a second."""
+_RECENT_S = 10.0
+"""Seconds of the recent frames that are measured."""
 _WINDOWS = 120
+"""Recent windows that are measured: their interval is set in seconds, so at any rate they are of one time."""
 _OPTIMAL_GAP = 1e-6
 """The largest gap of a solution that counts as none: rounding errors."""
 
@@ -97,11 +99,15 @@ class CameraMetrics:
     """Measures one camera by the headers of its frames and the reports of its windows.
 
     All times are of the camera's own clock, and are compared only with each other.
+
+    Args:
+        fps: frames a second.
+        now: returns the time, unix seconds.
     """
 
-    def __init__(self, now: Callable[[], float] = time.time) -> None:
-        self._now = now
-        self._errors: deque[float] = deque(maxlen=_FRAMES)
+    def __init__(self, fps: float, now: Callable[[], float] = time.time) -> None:
+        self._now, self._frames = now, frames_in(_RECENT_S, fps)
+        self._errors: deque[float] = deque(maxlen=self._frames)
         self._due: OrderedDict[int, float] = OrderedDict()
         self._delays: deque[float] = deque(maxlen=_WINDOWS)
         self._optimal: deque[bool] = deque(maxlen=_WINDOWS)
@@ -122,7 +128,7 @@ class CameraMetrics:
         self.totals.count_frame(head)
         self._errors.append(head.captured_at - head.due)
         self._due[head.pulse] = head.due
-        while len(self._due) > _FRAMES:
+        while len(self._due) > self._frames:
             self._due.popitem(last=False)
 
     def measure_window(self, tracks: CameraTracks) -> None:

@@ -18,7 +18,7 @@ class FrameBuffer:
     """
 
     def __init__(self, fps: float, frames: int, stream_format: StreamFormat) -> None:
-        self._fps = fps
+        self.fps = fps
         self._max_frames = frames
         self._stream_format = stream_format
         self._pictures: dict[int, EncodedPicture] = {}
@@ -36,7 +36,7 @@ class FrameBuffer:
         """
         if key:
             self._parameters = self._stream_format.accept(access_unit)
-        fragment = self._stream_format.pack(access_unit, pulse, self._fps, key=key)
+        fragment = self._stream_format.pack(access_unit, pulse, self.fps, key=key)
         picture = EncodedPicture(
             pulse,
             key,
@@ -46,7 +46,7 @@ class FrameBuffer:
             reference_pulse=reference_pulse,
             codec=self._stream_format.picture_codec,
         )
-        gap_filler = self._stream_format.gap_filler(picture, self._fps)
+        gap_filler = self._stream_format.gap_filler(picture, self.fps)
         if gap_filler is not None and not gap_filler.can_read(picture):
             raise DamagedFrameError(f"no picture can be read in the access unit of pulse {pulse}")
         self._pictures[pulse] = picture

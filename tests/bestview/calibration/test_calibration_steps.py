@@ -26,7 +26,7 @@ from bestview.geometry.ground_plane import foot_points
 from fakes.bestview.walkers import SIZE, Noise, camera_at, random_path, recorded_walk
 
 seeds = st.integers(0, 10_000).map(np.random.default_rng)
-SETTINGS = WalkSettings()
+SETTINGS = WalkSettings.at_rate(25.0)
 
 
 def any_camera(random: np.random.Generator) -> Pinhole:
@@ -180,24 +180,26 @@ def test_truncated_boxes_are_dropped_and_long_gaps_split_a_track() -> None:
     frames = [*range(20), *range(40, 60)]
     boxes = np.array([box] * 40)
     boxes[5] = [100.0, 260.0, 140.0, 360.0]  # at the lower edge
-    walk = build_walk("a", SIZE, frames, [1] * 40, boxes)
+    walk = build_walk("a", SIZE, frames, [1] * 40, boxes, 25.0)
     assert [(track.first_frame, track.end_frame) for track in walk.tracks] == [(0, 20), (40, 60)]
     assert np.allclose(walk.tracks[0].boxes[5], box)  # interpolated
-    assert build_walk("a", SIZE, [0, 1], [1, 1], np.array([[0.0, 10, 40, 90]] * 2)).tracks == ()
+    assert build_walk("a", SIZE, [0, 1], [1, 1], np.array([[0.0, 10, 40, 90]] * 2), 25.0).tracks == ()
 
 
+@pytest.mark.parametrize(("fps", "step"), [(2.0, 1), (5.0, 1), (25.0, 5), (60.0, 12)])
 @settings(deadline=None, max_examples=20)
-@given(seeds, st.integers(1, 9))
+@given(random=seeds)
 def test_a_walk_of_another_rate_is_averaged_over_the_same_time(
-    random: np.random.Generator, step: int
+    fps: float, step: int, random: np.random.Generator
 ) -> None:
+    assert WalkSettings.at_rate(fps) == WalkSettings(round(3 * fps), step)
     boxes = np.array([100.0, 80, 140, 200]) + random.uniform(-9, 9, (30, 4))
-    (track,) = build_walk("a", SIZE, range(30), [1] * 30, boxes, step).tracks
+    (track,) = build_walk("a", SIZE, range(30), [1] * 30, boxes, fps).tracks
     half = step // 2
     middle = [boxes[at - half : at + half + 1].mean(axis=0) for at in range(half, 30 - half)]
     assert np.allclose(track.boxes[half : 30 - half], middle)
     with_gaps = build_walk(
-        "a", SIZE, [0, 1, 1 + step, 2 + step, 3 + 2 * step, 4 + 2 * step], [1] * 6, boxes[:6], step
+        "a", SIZE, [0, 1, 1 + step, 2 + step, 3 + 2 * step, 4 + 2 * step], [1] * 6, boxes[:6], fps
     )
     assert [track.first_frame for track in with_gaps.tracks] == [0, 3 + 2 * step]
 

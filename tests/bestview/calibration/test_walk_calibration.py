@@ -13,6 +13,8 @@ from fakes.bestview.walkers import SIZE, camera_at, error_on_floor, random_path,
 
 WEST, SOUTH = camera_at(-4, -1), camera_at(1, -4.5, focal=0.7)
 PERSON = 1.75
+FPS = 25.0
+SYNCHRONIZED = WalkSettings.at_rate(FPS, 0.0)
 MIDDLE = np.random.default_rng(0).uniform(-1.5, 1.5, (50, 2))
 
 
@@ -29,7 +31,7 @@ def walks(
 def test_one_walking_person_calibrates_two_cameras_and_their_offset(seed: int, offset: int) -> None:
     random = np.random.default_rng(seed)
     given = walks(random, (WEST, SOUTH), [random_path(random, 450)], (0, offset))
-    found = calibrate_from_walks(given, WalkSettings(maximum_offset=30), PERSON)
+    found = calibrate_from_walks(given, WalkSettings.at_rate(FPS, 1.2), PERSON)
     assert found.uncalibrated == ()
     errors = error_on_floor(
         [calibration.homography for calibration in found.cameras], (WEST, SOUTH), MIDDLE, PERSON
@@ -48,7 +50,7 @@ def test_several_unidentified_people_and_a_ghost_calibrate_as_well() -> None:
     sway = 15 * np.sin(np.arange(400) / 9.0)[:, None] * np.array([1, 0.3, 1, 0.3])
     ghost = WalkTrack(0, box + sway)
     given[1] = replace(given[1], tracks=(*given[1].tracks, ghost))
-    found = calibrate_from_walks(given, WalkSettings(maximum_offset=0), PERSON)
+    found = calibrate_from_walks(given, SYNCHRONIZED, PERSON)
     errors = error_on_floor(
         [calibration.homography for calibration in found.cameras], (WEST, SOUTH), MIDDLE, PERSON
     )
@@ -59,7 +61,7 @@ def test_several_unidentified_people_and_a_ghost_calibrate_as_well() -> None:
 def test_calibration_is_deterministic() -> None:
     random = np.random.default_rng(9)
     given = walks(random, (WEST, SOUTH), [random_path(random, 120)], (0, 0))
-    brief = WalkSettings(maximum_offset=0, minimum_places=5.0, minimum_breadth=0.02, minimum_held_out=0.1)
+    brief = replace(SYNCHRONIZED, minimum_places=5.0, minimum_breadth=0.02, minimum_held_out=0.1)
     first, second = (calibrate_from_walks(given, brief, PERSON) for _ in range(2))
     for one, other in zip(first.cameras, second.cameras, strict=True):
         assert one.homography.tobytes() == other.homography.tobytes()
@@ -69,7 +71,7 @@ def test_a_camera_that_sees_other_people_is_not_calibrated() -> None:
     random = np.random.default_rng(8)
     given = walks(random, (WEST, SOUTH), [random_path(random, 300)], (0, 0))
     elsewhere = recorded_walk("c2", WEST, [random_path(random, 300)], random)
-    found = calibrate_from_walks([given[0], elsewhere, given[1]], WalkSettings(maximum_offset=0), PERSON)
+    found = calibrate_from_walks([given[0], elsewhere, given[1]], SYNCHRONIZED, PERSON)
     assert [calibration.camera for calibration in found.cameras] == ["c0", "c1"]
     (left_out,) = found.uncalibrated
     assert left_out.camera == "c2"
@@ -86,21 +88,21 @@ def test_a_straight_line_is_refused() -> None:
     random = np.random.default_rng(1)
     given = walks(random, (WEST, SOUTH), [straight(400)], (0, 0))
     with pytest.raises(CalibrationError, match="c0 and c1: the walk that both saw is a straight line"):
-        calibrate_from_walks(given, WalkSettings(maximum_offset=0))
+        calibrate_from_walks(given, SYNCHRONIZED)
 
 
 def test_standing_still_is_refused() -> None:
     random = np.random.default_rng(1)
     given = walks(random, (WEST, SOUTH), [np.zeros((400, 2))], (0, 0))
     with pytest.raises(CalibrationError, match=r"no person was tracked by both|walk longer where both see"):
-        calibrate_from_walks(given, WalkSettings(maximum_offset=0))
+        calibrate_from_walks(given, SYNCHRONIZED)
 
 
 def test_people_seen_by_one_camera_after_the_other_are_refused() -> None:
     random = np.random.default_rng(1)
     given = walks(random, (WEST, SOUTH), [random_path(random, 300)], (0, -1000))
     with pytest.raises(CalibrationError, match="no person was tracked by both cameras at the same time"):
-        calibrate_from_walks(given, WalkSettings(maximum_offset=0))
+        calibrate_from_walks(given, SYNCHRONIZED)
 
 
 def test_different_people_are_refused() -> None:
@@ -110,7 +112,7 @@ def test_different_people_are_refused() -> None:
         for name, camera in (("c0", WEST), ("c1", SOUTH))
     ]
     with pytest.raises(CalibrationError, match="c0 and c1"):
-        calibrate_from_walks(given, WalkSettings(maximum_offset=0))
+        calibrate_from_walks(given, SYNCHRONIZED)
 
 
 def test_people_who_only_for_a_while_walk_like_others_elsewhere_are_refused() -> None:
@@ -119,7 +121,7 @@ def test_people_who_only_for_a_while_walk_like_others_elsewhere_are_refused() ->
     alike = np.concatenate([path[:240], later[240:] - later[240] + path[240]])
     given = [recorded_walk("c0", WEST, [path], random), recorded_walk("c1", SOUTH, [alike], random)]
     with pytest.raises(CalibrationError, match="in a quarter of the walk they agree about only"):
-        calibrate_from_walks(given, WalkSettings(maximum_offset=0))
+        calibrate_from_walks(given, SYNCHRONIZED)
 
 
 def test_a_camera_that_was_turned_during_the_walk_is_refused() -> None:
@@ -140,12 +142,12 @@ def test_a_camera_that_was_turned_during_the_walk_is_refused() -> None:
     ]
     given = [recorded_walk("c0", WEST, [path], random), replace(before, tracks=tuple(kept))]
     with pytest.raises(CalibrationError, match="in a quarter of the walk they agree about only"):
-        calibrate_from_walks(given, WalkSettings(maximum_offset=0))
+        calibrate_from_walks(given, SYNCHRONIZED)
 
 
 def test_an_empty_walk_and_a_single_camera_are_refused() -> None:
     empty = [Walk(name, SIZE, ()) for name in ("c0", "c1")]
     with pytest.raises(CalibrationError, match="no person was tracked by both cameras at the same time"):
-        calibrate_from_walks(empty)
+        calibrate_from_walks(empty, SYNCHRONIZED)
     with pytest.raises(CalibrationError, match="at least two cameras"):
-        calibrate_from_walks(empty[:1])
+        calibrate_from_walks(empty[:1], SYNCHRONIZED)

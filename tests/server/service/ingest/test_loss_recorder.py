@@ -9,6 +9,7 @@ from server.media.stream_format import StreamFormat
 from server.service.ingest.camera_state import CameraState
 from server.service.ingest.epoch_aligner import Epoch
 from server.service.ingest.loss_recorder import LossRecorder
+from server.service.metrics.camera_metrics import CameraMetrics
 from server.service.streaming.frame_buffer import FrameBuffer
 
 A, B = CAMERAS
@@ -20,7 +21,7 @@ class LossyEpochs:
     def __init__(self) -> None:
         self.now = 0.0
         frame_buffers = {camera: FrameBuffer(FPS, 50, StreamFormat()) for camera in CAMERAS}
-        states = {camera: CameraState() for camera in CAMERAS}
+        states = {camera: CameraState(CameraMetrics(FPS)) for camera in CAMERAS}
         self.loss_recorder = LossRecorder(frame_buffers, states, STRIDE, lambda: self.now)
 
     def epochs(self, numbers: range, late: str | None = None) -> None:

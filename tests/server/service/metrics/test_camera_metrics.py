@@ -18,7 +18,7 @@ def head(pulse: int, late: float, due: float = 100.0) -> FrameHeader:
 
 @given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=600))
 def test_the_synchronization_error_is_of_recent_frames(errors: list[float]) -> None:
-    measured = CameraMetrics()
+    measured = CameraMetrics(25.0)
     assert measured.sync_error is None
     for pulse, late in enumerate(errors):
         measured.measure_frame(head(pulse, late, due=0.0))
@@ -29,8 +29,20 @@ def test_the_synchronization_error_is_of_recent_frames(errors: list[float]) -> N
     assert abs(spread.worst) == max(map(abs, last))
 
 
+@pytest.mark.parametrize("fps", [5.0, 25.0, 60.0])
+def test_measured_are_the_last_ten_seconds_at_any_frame_rate(fps: float) -> None:
+    measured, late = CameraMetrics(fps), camera_tracks("c0", 0, {1: SMALL}, solved_at=109.0)
+    for pulse in range(late.last, late.last + round(9.0 * fps)):
+        measured.measure_frame(head(pulse, 0.1, due=100.0 + (pulse - late.last) / fps))
+    measured.measure_window(late)
+    assert measured.tracking_delay == RecentSeconds(9.0, 9.0)
+    for pulse in range(round(11.0 * fps)):
+        measured.measure_frame(head(1000 + pulse, 0.0 if pulse >= fps else -0.5))
+    assert measured.sync_error == RecentSeconds(0.0, 0.0)
+
+
 def test_the_tracking_delay_counts_from_the_pulse_of_the_last_frame() -> None:
-    measured = CameraMetrics()
+    measured = CameraMetrics(25.0)
     message = camera_tracks("c0", 0, {1: SMALL}, solved_at=100.5)
     measured.measure_window(message)  # of a missed frame
     assert measured.tracking_delay is None
@@ -42,7 +54,7 @@ def test_the_tracking_delay_counts_from_the_pulse_of_the_last_frame() -> None:
 
 @pytest.mark.parametrize(("gaps", "share"), [([], None), ([0.0], 1.0), ([0.0, 0.1, 1e-12, 0.0], 0.75)])
 def test_a_window_is_optimal_if_its_gap_is_zero(gaps: list[float], share: float | None) -> None:
-    measured = CameraMetrics()
+    measured = CameraMetrics(25.0)
     for gap in gaps:
         solve = SolverReport(objective=-4.0, bound=-4.0, gap=gap, integral=False, rounds=1)
         measured.measure_window(msgspec.structs.replace(camera_tracks("c0", 0, {}), solve=solve))
@@ -51,7 +63,7 @@ def test_a_window_is_optimal_if_its_gap_is_zero(gaps: list[float], share: float 
 
 
 def test_a_new_run_resets_measurements_but_not_the_last_problem() -> None:
-    measured = CameraMetrics(now=lambda: 7.0)
+    measured = CameraMetrics(25.0, now=lambda: 7.0)
     measured.measure_frame(head(0, 0.1))
     measured.record_problem("it went\nwrong")
     measured.reset_recent()
