@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from contextlib import suppress
 from itertools import accumulate
 from pathlib import Path
@@ -16,6 +17,8 @@ from hypothesis import strategies as st
 
 from fakes.cli.command_line import RunCommand, myview
 from fakes.media.videos import STEP, damage, frame_in, write_timed, write_video
+from fakes.paths import DOCS
+from fakes.programs import needs_ffmpeg
 from server.camera.passthrough.compatibility import IncompatibleStreamError, RequiredFormat
 from server.camera.passthrough.recording_source import PassthroughRecording
 from server.camera.sources import SourceEndedError
@@ -150,6 +153,23 @@ def test_a_different_frame_rate_is_logged_once(tmp_path: Path, caplog: pytest.Lo
     assert caplog.messages == [
         f"{path} has 30 frames a second, the site 25: frames keep their times, some are dropped"
     ]
+
+
+@needs_ffmpeg
+@pytest.mark.parametrize("suffix", ["mp4", "mkv"])
+def test_the_documented_command_corrects_a_wrong_rate_without_encoding_again(
+    tmp_path: Path, suffix: str
+) -> None:
+    write_video(tmp_path / f"in.{suffix}", 25, fps=30)
+    text = (DOCS / "reference" / "cli.md").read_text(encoding="utf-8")
+    (command,) = re.findall(r"`(ffmpeg -itsscale [^`]*)`", text)
+    words = command.replace("in.mp4", f"in.{suffix}").split()
+    subprocess.run(words, cwd=tmp_path, check=True, capture_output=True, timeout=60)
+    out = tmp_path / "out.mp4"
+    assert shown(out) == shown(out, 7.0) == list(range(25))
+    recording = Recording(str(out), quiet=True)
+    assert recording.fps == pytest.approx(7.0, rel=1e-3)
+    recording.close()
 
 
 def test_an_uneven_frame_rate_is_logged(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
