@@ -75,6 +75,11 @@ class DecisionState:
             ],
         )
 
+    def is_visible(self, number: int) -> bool:
+        """Return whether a camera sees an object at the end of the newest decided GOP."""
+        view = self.selected_views.get(number)
+        return view is not None and bool(view.cameras)
+
     def resolve(self, number: int) -> int:
         """Return a merged person's current number."""
         return self.merged.get(number, number)

@@ -137,7 +137,10 @@ class PeopleService:
         return summaries
 
     def list_remote_people(self) -> list[RemotePerson]:
-        """Return the people of the site's other services, by number."""
+        """Return the people of the site's other services, by number; who has a view here is not one of them.
+
+        Between two decisions another service may have taken somebody over already.
+        """
         share, people = self._pipeline.config.view.share, self._pipeline.decider.people
         return [
             RemotePerson(
@@ -146,6 +149,7 @@ class PeopleService:
                 people.sharding.is_visible_elsewhere(number),
             )
             for number in people.of_other_shards
+            if number not in self._pipeline.decision_state.selected_views
         ]
 
     @property

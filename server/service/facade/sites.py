@@ -37,14 +37,14 @@ class SitesService:
     """Queries about other sites. A viewer's token is given by its SHA-256; None: they have none."""
 
     def __init__(self, pipeline: BestViewPipeline) -> None:
-        self._sites = pipeline.other_sites
+        self._sites, self._decisions = pipeline.other_sites, pipeline.decision_state
 
     def list_people(self, token_sha256: str | None) -> list[PersonAtSite]:
-        """Return whom other sites have seen last, by number, if they accept a viewer."""
+        """Return whom other sites have seen last, by number, if they accept a viewer; nobody visible here."""
         found = []
         for person in self._sites.whereabouts():
             site = self._sites.sites[person.site]
-            if site.may_know(token_sha256, person.number):
+            if site.may_know(token_sha256, person.number) and not self._decisions.is_visible(person.number):
                 found.append(
                     PersonAtSite(
                         person.number,

@@ -54,9 +54,8 @@ class LinkedSites:
         links = {other: {"connect": "tcp/127.0.0.1:1", "url": f"http://{other}/"} for other in NAMES}
         del links[name]
         sites = {"of": len(NAMES), "index": index, "link": links} | settings.pop("sites", {})
-        service = FedService(
-            small_config(site={"name": name}, sites=sites, view={"identity": IDENTITY}, **settings)
-        )
+        view = {"identity": IDENTITY} | settings.pop("view", {})
+        service = FedService(small_config(site={"name": name}, sites=sites, view=view, **settings))
         service.other_sites._clock = lambda: self.now
         service.other_sites.publisher._bus = _End(self, name)  # type: ignore[assignment]
         service.connect_cameras(*CAMERAS)

@@ -45,12 +45,12 @@ class Served:
 
 
 @asynccontextmanager
-async def two_sites(hall: dict[str, Any], yard: dict[str, Any]) -> AsyncIterator[Served]:
+async def two_sites(hall: dict[str, Any], yard: dict[str, Any], **view: Any) -> AsyncIterator[Served]:
     """Serve two sites; a person walks from the hall into the yard, where somebody else was before."""
     with linked_sites() as sites:
         for name, access in (("hall", hall), ("yard", yard)):
             sites.stop(name)
-            sites.start(name, access=access)
+            sites.start(name, access=access, view=view)
         apps = {name: make_app(BestViewService(service)) for name, service in sites.running.items()}
         async with AsyncExitStack() as stack:
             ports = [
@@ -87,6 +87,25 @@ async def test_viewers_are_led_to_the_site_that_sees_the_person() -> None:
         served.sites.walk(4, hall={A: SMALL})
         assert await served.elsewhere() == [{"object": 2, **there}]
         assert (await served.get("/objects/1/best.mp4"))[0] != 307
+
+
+async def test_who_is_still_shown_here_is_not_listed_at_another_site_yet() -> None:
+    async with two_sites(OPEN, OPEN, lookahead_s=4.0) as served:
+        served.sites.walk(3)
+        served.sites.walk(5, hall={A: SMALL})
+        served.sites.walk(1.2)
+        found = []
+        for _ in range(12):
+            served.sites.walk(0.4, yard={A: SMALL})
+            _, _, objects = await served.get("/api/objects")
+            here, there = (
+                1 in [person["object"] for person in objects[listed] if person["visible"]]
+                for listed in ("objects", "elsewhere")
+            )
+            is_redirected = (await served.get("/api/objects/1/choice"))[0] == 307
+            found.append((here, there, is_redirected))
+        assert set(found) == {(True, False, False), (False, True, True)}
+        assert found == sorted(found, reverse=True)
 
 
 async def test_people_at_other_sites_are_listed_in_the_terminal(capsys: pytest.CaptureFixture[str]) -> None:

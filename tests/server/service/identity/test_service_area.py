@@ -16,6 +16,7 @@ from fakes.service.scripted_cameras import CAMERAS, SMALL, FedService, camera_tr
 from fakes.timeouts import PATIENCE
 from server.config.sections import HttpSettings, ShareSettings
 from server.config.site_config import Config
+from server.http.api.responses import objects_info
 from server.http.app import make_app, serving
 from server.messaging.messages import CameraTracks
 from server.messaging.observations import FrameObservations, unpack_observations
@@ -224,6 +225,30 @@ async def test_people_of_other_areas_are_listed_with_their_service(west_service:
         (2, "http://east:1/", True),
         (4, "http://east:1/", False),
     ]
+
+
+def test_who_leaves_the_area_is_listed_here_or_there_and_never_in_both() -> None:
+    service = FedService(config_of_areas(0).of_service())
+    service.connect_cameras("c0")
+    for epoch in range(4):
+        service.feed(epoch, {"c0": {1: SMALL}})
+    area = service.decider.people.sharding
+    assert isinstance(area, ShardingByArea)
+    there = {1: OtherArea(1, 1_000_000, is_visible=True)}
+    area.set_other_areas(there)
+
+    def listed() -> tuple[list[int], list[int]]:
+        found = objects_info(BestViewService(service))
+        return [person.object for person in found.objects], [person.object for person in found.elsewhere]
+
+    assert listed() == ([1], [])
+    area.update([], 100)
+    assert area.own([1], {}) == [], "released, which no decision has taken in"
+    assert listed() == ([1], [])
+    service.feed(4, {"c0": {}})
+    area.set_other_areas(there)
+    assert listed() == ([], [1])
+    service.close()
 
 
 async def test_watch_lists_people_of_other_areas(west_service: str) -> None:
