@@ -11,10 +11,10 @@ from client.model import (
     Choice,
     Delay,
     Delays,
-    Elsewhere,
     Gop,
     Objects,
     Past,
+    PersonElsewhere,
     SeenObject,
     Site,
     Span,
@@ -44,7 +44,7 @@ async def objects(url: str, settings: HttpSettings = _DEFAULT) -> tuple[SeenObje
     return (await get_json(server_url(url) / "api/objects", Objects, settings)).objects
 
 
-async def elsewhere(url: str, settings: HttpSettings = _DEFAULT) -> tuple[Elsewhere, ...]:
+async def elsewhere(url: str, settings: HttpSettings = _DEFAULT) -> tuple[PersonElsewhere, ...]:
     """Return the objects of other services and sites, by number; errors as ``site``."""
     return (await get_json(server_url(url) / "api/objects", Objects, settings)).elsewhere
 

@@ -223,7 +223,7 @@ class Past(msgspec.Struct, frozen=True):
     spans: tuple[Span, ...]
 
 
-class Elsewhere(msgspec.Struct, frozen=True):
+class PersonElsewhere(msgspec.Struct, frozen=True):
     """Somebody whom another service of the site serves, or whom another site has seen last."""
 
     object: int
@@ -241,7 +241,7 @@ class Objects(msgspec.Struct, frozen=True):
     """Event ``objects``, and the response of ``/api/objects``."""
 
     objects: tuple[SeenObject, ...]
-    elsewhere: tuple[Elsewhere, ...] = ()
+    elsewhere: tuple[PersonElsewhere, ...] = ()
     """People of other services and sites."""
 
 

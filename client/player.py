@@ -9,7 +9,7 @@ from pathlib import Path
 
 from client.api import site
 from client.http import ClientError, HttpSettings, server_url
-from client.model import Elsewhere
+from client.model import PersonElsewhere
 from client.recording import Recording, recording
 from client.session import Report, Session
 from client.sidecar import write_sidecars
@@ -95,7 +95,7 @@ async def _watch_site(
     end: str | None,
     delay: str | None,
     settings: HttpSettings,
-) -> tuple[WatchResult, Elsewhere | None]:
+) -> tuple[WatchResult, PersonElsewhere | None]:
     """Follow the object at one site; return where it has gone, too."""
     container, settings = await _prepare(url, out, settings)
     record: Recording | None = None
@@ -121,7 +121,7 @@ async def _watch_site(
     return result, history.elsewhere if session.has_moved and not complete else None
 
 
-def _at(place: Elsewhere, url: str, settings: HttpSettings) -> tuple[str, HttpSettings] | None:
+def _at(place: PersonElsewhere, url: str, settings: HttpSettings) -> tuple[str, HttpSettings] | None:
     """Return another site's or area's address and settings; None: none, or not encrypted as this one is."""
     try:
         there, here = server_url(place.server or ""), server_url(url)

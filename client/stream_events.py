@@ -14,7 +14,7 @@ import msgspec
 from client.api import past, site
 from client.events import events
 from client.http import ClientError, HttpSettings
-from client.model import Box, Elsewhere, Event, Gop, Objects, Site
+from client.model import Box, Event, Gop, Objects, PersonElsewhere, Site
 from client.spool import Place, Spool
 
 _log = logging.getLogger(__name__)
@@ -45,7 +45,7 @@ class ViewHistory:
     def __init__(self, number: int, *, spool: Spool | None = None) -> None:
         self.number = number
         self.site: Site | None = None
-        self.elsewhere: Elsewhere | None = None
+        self.elsewhere: PersonElsewhere | None = None
         """Where they are, if another site or area sees the object now."""
         self._numbers = {number}
         """The object's, with those that the server last said are merged with it."""
@@ -64,7 +64,7 @@ class ViewHistory:
             self.elsewhere = self._elsewhere(event)
         self._updated.set()
 
-    def _elsewhere(self, objects: Objects) -> Elsewhere | None:
+    def _elsewhere(self, objects: Objects) -> PersonElsewhere | None:
         for here in objects.objects:
             if self.number in {here.object, *here.aliases}:
                 self._numbers = {here.object, *here.aliases}

@@ -7,7 +7,7 @@ into persons, and `registry` assigns, corrects and remembers person ids.
 
 from bestview.association.registry.corrections import IdentityUpdate, Merge, Split
 from bestview.association.registry.identity_registry import IdentityRegistry
-from bestview.association.registry.other_sites import SINGLE_SITE, IdSeries, RemoteSighting
+from bestview.association.registry.other_sites import SINGLE_SITE, IdSeries, SiteSighting
 from bestview.association.registry.person import Person
 from bestview.association.settings import IdentitySettings
 from bestview.association.sightings import AppearanceHistogram, TrackUpdate
@@ -22,7 +22,7 @@ __all__ = [
     "IdentityUpdate",
     "Merge",
     "Person",
-    "RemoteSighting",
+    "SiteSighting",
     "Split",
     "TrackKey",
     "TrackUpdate",

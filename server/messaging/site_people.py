@@ -152,8 +152,8 @@ class SitePeople(msgspec.Struct, frozen=True, kw_only=True):
             raise ValueError("a person has two sightings")
 
 
-class SiteSighting(msgspec.Struct, frozen=True):
-    """A person in a message."""
+class SightingRow(msgspec.Struct, frozen=True):
+    """A person in a message: a row of its people."""
 
     number: int
     camera: str
@@ -163,7 +163,7 @@ class SiteSighting(msgspec.Struct, frozen=True):
     """For which they have been there; None: they have left."""
 
 
-def pack_sightings(sightings: list[SiteSighting], cameras: list[str]) -> bytes:
+def pack_sightings(sightings: list[SightingRow], cameras: list[str]) -> bytes:
     """Pack people, at most `PEOPLE_MAX`; their cameras must be in the list."""
     index = {camera: place for place, camera in enumerate(cameras)}
     rows = [
@@ -178,10 +178,10 @@ def pack_sightings(sightings: list[SiteSighting], cameras: list[str]) -> bytes:
     return np.array(rows, dtype=_ROW).tobytes()
 
 
-def unpack_sightings(message: SitePeople) -> list[SiteSighting]:
+def unpack_sightings(message: SitePeople) -> list[SightingRow]:
     """Return the people in a message."""
     return [
-        SiteSighting(number, message.cameras[camera], age, None if stay < 0 else stay)
+        SightingRow(number, message.cameras[camera], age, None if stay < 0 else stay)
         for number, camera, age, stay in np.frombuffer(message.people, _ROW).tolist()
     ]
 

@@ -79,13 +79,13 @@ def test_a_token_goes_along_only_to_a_site_that_accepts_it(
     url: str, place: dict[str, Any], expected: tuple[str, str | None] | None
 ) -> None:
     settings = HttpSettings(token=TOKEN, others=("http://hall-2/",))
-    found = _at(client.Elsewhere(object=1, site="yard", visible=True, **place), url, settings)
+    found = _at(client.PersonElsewhere(object=1, site="yard", visible=True, **place), url, settings)
     assert (None if found is None else (found[0], found[1].token)) == expected
     assert found is None or not found[1].others
 
 
 def test_a_token_goes_along_into_another_area_of_the_same_site() -> None:
-    place = client.Elsewhere(object=1, server="http://hall-2/", visible=True)
+    place = client.PersonElsewhere(object=1, server="http://hall-2/", visible=True)
     found = _at(place, "http://hall/", HttpSettings(token=TOKEN))
     assert found is not None
     assert found[1].token == TOKEN
@@ -94,7 +94,7 @@ def test_a_token_goes_along_into_another_area_of_the_same_site() -> None:
 def test_whoever_was_merged_into_another_number_is_followed_by_that_one() -> None:
     history = ViewHistory(1)
     [person] = msgspec.convert(OBJECTS, client.Objects).objects
-    there = client.Elsewhere(object=4, server="http://yard/", site="yard", visible=True)
+    there = client.PersonElsewhere(object=4, server="http://yard/", site="yard", visible=True)
     merged = msgspec.structs.replace(person, object=4, aliases=(1,), visible=True)
     history.take(client.Objects((merged,), (there,)))
     assert history.elsewhere is None

@@ -19,9 +19,9 @@ from server.messaging.messages import ZenohKeys
 from server.messaging.packed_arrays import pack_histograms
 from server.messaging.site_people import (
     PersonHistogram,
+    SightingRow,
     SiteDeletion,
     SitePeople,
-    SiteSighting,
     TokenDigest,
     Viewers,
     pack_population,
@@ -66,7 +66,7 @@ class OtherSitesMessages(ScriptTarget):
     @staticmethod
     def _message(rng: Random, index: int) -> SitePeople:
         numbers = rng.sample(range(1, 30), rng.randrange(6))
-        rows = [SiteSighting(number, "c0", 9 * rng.random(), rng.choice((None, 5.0))) for number in numbers]
+        rows = [SightingRow(number, "c0", 9 * rng.random(), rng.choice((None, 5.0))) for number in numbers]
         histograms = np.random.default_rng(rng.randrange(99)).dirichlet(np.ones(_BINS), len(numbers))
         return SitePeople(
             index=index,
@@ -110,5 +110,5 @@ class OtherSitesMessages(ScriptTarget):
             sites.whereabouts()
         known = people.identity.people
         assert len({person.person_id for person in known}) == len(known)
-        assert len(sites.elsewhere.by_number) <= config.sites.people_max
+        assert len(sites.last_sightings.by_number) <= config.sites.people_max
         return not (sites.bad_messages or any(linked.refused for linked in sites.sites.values()))

@@ -21,7 +21,7 @@ from bestview.association.registry.corrections import IdCorrections, IdentityUpd
 from bestview.association.registry.other_sites import (
     SINGLE_SITE,
     IdSeries,
-    RemoteSighting,
+    SiteSighting,
     sum_over_cameras,
 )
 from bestview.association.registry.people import PersonStore
@@ -226,14 +226,14 @@ class IdentityRegistry:
         """Add people whom another run remembers, before their first track is observed here."""
         self._people.restore(people)
 
-    def add_remote_sightings(
-        self, sightings: Iterable[RemoteSighting], populations: Mapping[str, NDArray[np.float64]]
+    def add_site_sightings(
+        self, sightings: Iterable[SiteSighting], populations: Mapping[str, NDArray[np.float64]]
     ) -> None:
         """Add people whom other sites see or have seen: who arrives here can be one who has left there.
 
         `populations` are what `population` returns at these sites, by their names.
         """
-        self._people.add_remote_sightings(sightings, populations)
+        self._people.add_site_sightings(sightings, populations)
 
     def population(self, bins: int) -> NDArray[np.float64]:
         """Return the sum of the (B,) histograms of all tracks: how this site's cameras render people."""

@@ -59,7 +59,7 @@ SINGLE_SITE = IdSeries()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RemoteSighting:
+class SiteSighting:
     """A person whom another site sees, or has seen last.
 
     Attributes:

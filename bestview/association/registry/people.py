@@ -12,7 +12,7 @@ from bestview.association.affinity.affinity_matrix import AffinityMatrix
 from bestview.association.appearance.cross_camera import CrossCameraAppearance
 from bestview.association.appearance.histograms import PersonAppearance
 from bestview.association.registry.corrections import Merge
-from bestview.association.registry.other_sites import SINGLE_SITE, IdSeries, RemoteSighting
+from bestview.association.registry.other_sites import SINGLE_SITE, IdSeries, SiteSighting
 from bestview.association.registry.person import Person
 from bestview.association.registry.reidentification import LostPerson, Reidentifier
 from bestview.association.settings import ResolvedIdentitySettings
@@ -172,15 +172,15 @@ class PersonStore:
         self._reserve_after(person_id)
         self._by_id.setdefault(person_id, Person(person_id, frame))
 
-    def add_remote_sightings(
-        self, sightings: Iterable[RemoteSighting], populations: Mapping[str, NDArray[np.float64]]
+    def add_site_sightings(
+        self, sightings: Iterable[SiteSighting], populations: Mapping[str, NDArray[np.float64]]
     ) -> None:
         """Add what other sites know about people, and how they render them, by site."""
         for site, population in populations.items():
             self._reidentifier.populations.put(site, population)
         for sighting in sightings:
             unknown = Person(sighting.person_id, departed=True, elsewhere=True)
-            self._by_id.setdefault(sighting.person_id, unknown).add_remote_sighting(sighting)
+            self._by_id.setdefault(sighting.person_id, unknown).add_site_sighting(sighting)
 
     @property
     def all_people(self) -> list[Person]:

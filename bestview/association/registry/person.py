@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from bestview.association.affinity.travel_times import CameraSighting
 from bestview.association.appearance.histograms import MeanHistogram, PersonAppearance
-from bestview.association.registry.other_sites import RemoteSighting
+from bestview.association.registry.other_sites import SiteSighting
 
 
 @dataclass(slots=True, eq=False)
@@ -21,7 +21,7 @@ class Person:
         appearance: of the settled tracklets.
         settled_frames: their frames that were published with this id.
         unused_since: frame since which no cluster has the id; -1: one has it.
-        remote_histograms: at other sites, by site.
+        site_histograms: at other sites, by site.
         elsewhere: another site has seen them last; they take part in no clustering.
         visible_elsewhere: it sees them now, so that nobody here is them.
     """
@@ -33,7 +33,7 @@ class Person:
     appearance: PersonAppearance = field(default_factory=PersonAppearance)
     settled_frames: int = 0
     unused_since: int = -1
-    remote_histograms: dict[str, MeanHistogram] = field(default_factory=dict)
+    site_histograms: dict[str, MeanHistogram] = field(default_factory=dict)
     elsewhere: bool = False
     visible_elsewhere: bool = False
 
@@ -48,10 +48,10 @@ class Person:
             self.last_frame, self.camera = frame, camera
             self.elsewhere = self.visible_elsewhere = False
 
-    def add_remote_sighting(self, sighting: RemoteSighting) -> None:
+    def add_site_sighting(self, sighting: SiteSighting) -> None:
         """Record that another site sees the person, unless this one has seen them since."""
         if sighting.histogram is not None:
-            self.remote_histograms[sighting.site] = sighting.histogram
+            self.site_histograms[sighting.site] = sighting.histogram
         if self.elsewhere or sighting.frame > self.last_frame:
             self.last_frame, self.camera = sighting.frame, sighting.camera_name
             self.elsewhere, self.visible_elsewhere = True, sighting.is_visible
@@ -62,4 +62,4 @@ class Person:
         if not other.elsewhere:
             self.add_sighting(other.camera, other.last_frame)
         self.settled_frames += other.settled_frames
-        self.remote_histograms = other.remote_histograms | self.remote_histograms
+        self.site_histograms = other.site_histograms | self.site_histograms

@@ -99,8 +99,8 @@ class Reidentifier:
         )
         time = self._travel.evidence(arrivals, departures)
         distances = appearance_distances(cross_camera.equalizer, *appearances)
-        remote_histograms = [lost_person.person.remote_histograms for lost_person in lost]
-        between_sites = self.populations.distances(cross_camera.equalizer, appearances[0], remote_histograms)
+        site_histograms = [lost_person.person.site_histograms for lost_person in lost]
+        between_sites = self.populations.distances(cross_camera.equalizer, appearances[0], site_histograms)
         distances = np.where(np.isnan(distances), between_sites, distances)
         gate = cross_camera.same_person_gate
         by_appearance = match_by_appearance(distances, possible, gate)

@@ -2,7 +2,7 @@
 
 import { make } from '../shared/dom.js';
 
-/** @import {Elsewhere} from '../shared/api_types.js' */
+/** @import {PersonElsewhere} from '../shared/api_types.js' */
 /** @import {Viewer} from '../viewer.js' */
 
 const SETTLED_MS = 3000; // after the page was opened: a person whom two sites or areas see for a moment is not followed to and fro
@@ -10,7 +10,7 @@ const SETTLED_MS = 3000; // after the page was opened: a person whom two sites o
 export class PeopleElsewhere {
   #shown = '';
   #opened = performance.now();
-  /** @type {(Elsewhere & {address: string})[]} */
+  /** @type {(PersonElsewhere & {address: string})[]} */
   #others = [];
   /** @type {number | undefined} */
   #due;
@@ -25,7 +25,7 @@ export class PeopleElsewhere {
     this.viewer = viewer;
   }
 
-  /** @param {Elsewhere[]} people known to the server, at other sites or at other services of this one */
+  /** @param {PersonElsewhere[]} people known to the server, at other sites or at other services of this one */
   show(people) {
     const others = people.flatMap((person) => {
       const address = addressOf(person);
@@ -51,7 +51,7 @@ export class PeopleElsewhere {
 }
 
 /**
- * @param {Elsewhere} person
+ * @param {PersonElsewhere} person
  * @returns {string | null} the address of the page there with this person; null: this page has them
  */
 function addressOf({ object, server, visible }) {
@@ -62,7 +62,7 @@ function addressOf({ object, server, visible }) {
   return address.href;
 }
 
-/** @param {Elsewhere & {address: string}} person */
+/** @param {PersonElsewhere & {address: string}} person */
 function item({ object, site, visible, address }) {
   const link = make('a', { href: address, textContent: `Person ${object}` });
   const place = site ? `${visible ? 'at' : 'left'} ${site}` : `${visible ? 'in' : 'was in'} another area`;

@@ -46,7 +46,7 @@
  * @property {string[]} cameras that see the person now
  * @property {string | null} thumbnail
  *
- * @typedef {object} Elsewhere an entry of /api/objects: somebody whom another service or site serves
+ * @typedef {object} PersonElsewhere an entry of /api/objects: somebody whom another service or site serves
  * @property {number} object
  * @property {string | null} server base URL
  * @property {string | null} [site] name of the other site; null: it is another service of this one

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from server.http.access.permissions import Scope
-from server.http.api.schema import Cameras, Delays, Elsewhere, ObjectInfo, Objects, SiteInfo
+from server.http.api.schema import Cameras, Delays, ObjectInfo, Objects, SiteInfo
 from server.service.facade.streams import DelayMode
 from server.service.service import BestViewService
 
@@ -59,15 +59,7 @@ def objects_info(service: BestViewService, token: str | None = None) -> Objects:
         )
         for person in service.people.list_people()
     ]
-    elsewhere = [
-        Elsewhere(person.number, person.server, visible=person.is_visible)
-        for person in service.people.list_remote_people()
-    ]
-    elsewhere += [
-        Elsewhere(person.number, person.url, person.site, person.is_visible, person.knows_token)
-        for person in service.sites.list_people(token)
-    ]
-    return Objects(objects, elsewhere)
+    return Objects(objects, [*service.people.list_elsewhere(), *service.sites.list_elsewhere(token)])
 
 
 def cameras_info(service: BestViewService) -> Cameras:

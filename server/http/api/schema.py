@@ -7,6 +7,7 @@ import msgspec
 from server.config.sections.access import Blur
 from server.service.facade.assist import Flag
 from server.service.facade.cameras import CameraInfo
+from server.service.facade.people import PersonElsewhere
 from server.service.facade.streams import ViewerDelay
 
 
@@ -66,26 +67,11 @@ class ObjectInfo(msgspec.Struct, frozen=True):
     """URL of a thumbnail; it changes with the picture."""
 
 
-class Elsewhere(msgspec.Struct, frozen=True):
-    """A person whom another best-view service of the site serves, or whom another site has seen last."""
-
-    object: int
-    server: str | None
-    """Its base URL; null if not configured."""
-    site: str | None = None
-    """The other site's name; null: it is of this one."""
-    visible: bool | None = None
-    """Whether the other site, or the service of another area, sees the person now; null: a service that all
-    cameras send to."""
-    token: bool = False
-    """Whether it is another site that requires a token, and accepts that of the request."""
-
-
 class Objects(msgspec.Struct, frozen=True):
     """All known people."""
 
     objects: list[ObjectInfo]
-    elsewhere: list[Elsewhere]
+    elsewhere: list[PersonElsewhere]
     """People of the site's other services, and of other sites that accept the viewer."""
 
 

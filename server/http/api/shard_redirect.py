@@ -10,7 +10,7 @@ from aiohttp import web
 from server.http.access.authorization import ACCESS
 from server.http.app_keys import SERVICE
 from server.http.json_responses import error_response
-from server.service.facade.sites import PersonAtSite
+from server.service.facade.people import PersonElsewhere
 
 _LIVE = {
     *(f"/objects/{{object}}/best.{form}" for form in ("mp4", "ts", "webm", "mjpeg", "jpg")),
@@ -41,9 +41,9 @@ async def redirect_to_shard(
         return await handler(request)  # of when the person was here
     if shard.is_own:
         there = _at_other_site(request, number)
-        if there is None:
+        if there is None or there.server is None:
             return await handler(request)
-        return _redirect(there.url, request, there.knows_token, number)
+        return _redirect(there.server, request, there.token, number)
     if shard.server is None:
         return error_response(
             404,
@@ -53,7 +53,7 @@ async def redirect_to_shard(
     return _redirect(shard.server, request, with_token=True, number=number)
 
 
-def _at_other_site(request: web.Request, number: int) -> PersonAtSite | None:
+def _at_other_site(request: web.Request, number: int) -> PersonElsewhere | None:
     """Return where a person is whose live pictures are requested; None: here, or the sender may not know."""
     if not _is_live(request):
         return None

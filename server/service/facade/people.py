@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import msgspec
+
 from server.messaging.camera_identity_snapshot import NAME_LENGTH_MAX
 from server.messaging.messages import GopChoices
 from server.service.facade.errors import (
@@ -22,9 +24,9 @@ from server.service.view_selection.delay_modes import DelayMode
 __all__ = [
     "MergePeople",
     "PeopleService",
+    "PersonElsewhere",
     "PersonOverrides",
     "PersonSummary",
-    "RemotePerson",
     "RenamePerson",
     "Shard",
     "SplitPerson",
@@ -53,15 +55,19 @@ class PersonSummary:
     """The frame of the newest thumbnail; None: there is none."""
 
 
-@dataclass(frozen=True, slots=True)
-class RemotePerson:
-    """A person of another best-view service of the site."""
+class PersonElsewhere(msgspec.Struct, frozen=True):
+    """A person whom another best-view service of the site serves, or whom another site has seen last."""
 
-    number: int
+    object: int
     server: str | None
-    """Base URL of that service; None where the configuration does not name it."""
-    is_visible: bool | None
-    """Whether that service sees them now; None: it has the same cameras as this one."""
+    """Its base URL; null if not configured."""
+    site: str | None = None
+    """The other site's name; null: it is of this one."""
+    visible: bool | None = None
+    """Whether the other site, or the service of another area, sees the person now; null: a service that all
+    cameras send to."""
+    token: bool = False
+    """Whether it is another site that requires a token, and accepts that of the request."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,17 +142,17 @@ class PeopleService:
             )
         return summaries
 
-    def list_remote_people(self) -> list[RemotePerson]:
+    def list_elsewhere(self) -> list[PersonElsewhere]:
         """Return the people of the site's other services, by number; who has a view here is not one of them.
 
         Between two decisions another service may have taken somebody over already.
         """
         share, people = self._pipeline.config.view.share, self._pipeline.decider.people
         return [
-            RemotePerson(
+            PersonElsewhere(
                 number,
                 shard_address(people.sharding.shard_of(number), share),
-                people.sharding.is_visible_elsewhere(number),
+                visible=people.sharding.is_visible_elsewhere(number),
             )
             for number in people.of_other_shards
             if number not in self._pipeline.decision_state.selected_views

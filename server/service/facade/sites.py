@@ -5,23 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from server.service.facade.people import PersonElsewhere
 from server.service.other_sites.people_publisher import Tokens
 from server.service.pipeline import BestViewPipeline
-
-
-@dataclass(frozen=True, slots=True)
-class PersonAtSite:
-    """A person whom another site has seen last."""
-
-    number: int
-    site: str
-    """Its name."""
-    url: str
-    """Base URL of its page."""
-    is_visible: bool
-    """Whether it sees them now."""
-    knows_token: bool
-    """Whether it requires a token, and accepts the viewer's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,27 +25,28 @@ class SitesService:
     def __init__(self, pipeline: BestViewPipeline) -> None:
         self._sites, self._decisions = pipeline.other_sites, pipeline.decision_state
 
-    def list_people(self, token_sha256: str | None) -> list[PersonAtSite]:
+    def list_elsewhere(self, token_sha256: str | None) -> list[PersonElsewhere]:
         """Return whom other sites have seen last, by number, if they accept a viewer; nobody visible here."""
         found = []
-        for person in self._sites.whereabouts():
-            site = self._sites.sites[person.site]
-            if site.may_know(token_sha256, person.number) and not self._decisions.is_visible(person.number):
+        for sighting in self._sites.whereabouts():
+            site = self._sites.sites[sighting.site]
+            may_know = site.may_know(token_sha256, sighting.number)
+            if may_know and not self._decisions.is_visible(sighting.number):
                 found.append(
-                    PersonAtSite(
-                        person.number,
-                        site.name,
+                    PersonElsewhere(
+                        sighting.number,
                         site.settings.base_url,
-                        person.stay_s is not None,
-                        not site.viewers.is_open,
+                        site.name,
+                        visible=sighting.stay_s is not None,
+                        token=not site.viewers.is_open,
                     )
                 )
         return found
 
-    def find(self, number: int, token_sha256: str | None) -> PersonAtSite | None:
+    def find(self, number: int, token_sha256: str | None) -> PersonElsewhere | None:
         """Return where a person was seen last; None: here, nowhere, or the viewer may not know."""
-        people = self.list_people(token_sha256) if self._sites.sites else []
-        return next((person for person in people if person.number == number), None)
+        people = self.list_elsewhere(token_sha256) if self._sites.sites else []
+        return next((person for person in people if person.object == number), None)
 
     def audience(self, token_sha256: str | None) -> str | None:
         """Return what distinguishes a viewer from others, as to what they may know of other sites."""

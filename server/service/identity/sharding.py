@@ -32,17 +32,17 @@ class TracksOfPeople:
 
 
 @dataclass(frozen=True, slots=True)
-class OtherArea:
-    """The first other area that has a person.
+class AreaSighting:
+    """Where the service of another area has seen a person; of several that of the first area.
 
     Attributes:
         area: its index.
-        here: the last frame in which they certainly were there.
-        is_visible: whether its service sees them now.
+        frame: the last one in which they certainly were there.
+        is_visible: whether the service sees them now.
     """
 
     area: int
-    here: int
+    frame: int
     is_visible: bool
 
 
@@ -146,7 +146,7 @@ class ShardingByArea:
         self._released_after = round(_RELEASED_AFTER_S * fps)
         self._seen: dict[int, int] = {}
         """By number, of the people in the area, the last frame in which they certainly were."""
-        self._elsewhere: dict[int, OtherArea] = {}
+        self._elsewhere: dict[int, AreaSighting] = {}
         """By number, people whom other services have."""
 
     @property
@@ -198,11 +198,11 @@ class ShardingByArea:
         other = self._elsewhere.get(number)
         if other is None or frame - last <= self._released_after:
             return False
-        return (-other.here, other.area) < (-last, self._share.share)
+        return (-other.frame, other.area) < (-last, self._share.share)
 
-    def set_other_areas(self, elsewhere: Mapping[int, OtherArea]) -> None:
+    def set_sightings(self, sightings: Mapping[int, AreaSighting]) -> None:
         """Replace what other services say about who is in their areas, by number."""
-        self._elsewhere = dict(elsewhere)
+        self._elsewhere = dict(sightings)
 
     def renumber(self, numbers: Mapping[int, int]) -> None:
         """Replace people's numbers by others."""

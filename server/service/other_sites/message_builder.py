@@ -15,9 +15,9 @@ from server.messaging.site_people import (
     HISTOGRAMS_MAX,
     PEOPLE_MAX,
     PersonHistogram,
+    SightingRow,
     SiteDeletion,
     SitePeople,
-    SiteSighting,
     Viewers,
     pack_population,
     pack_sightings,
@@ -116,9 +116,9 @@ class SiteMessageBuilder:
             sent.is_visible, sent.at = person.is_visible, self._count
         return chosen
 
-    def _sighting(self, person: PersonHere, pulse: int) -> SiteSighting:
+    def _sighting(self, person: PersonHere, pulse: int) -> SightingRow:
         arrived = self._here.arrived(person.number) if person.is_visible else None
-        return SiteSighting(
+        return SightingRow(
             person.number,
             person.camera,
             max(0, pulse - person.last_seen) / self._fps,

@@ -6,7 +6,8 @@ import logging
 
 from server.config.site_config import Config
 from server.service.identity.person_tracker import PersonTracker
-from server.service.other_sites.people_elsewhere import LinkedSite, PersonElsewhere
+from server.service.other_sites.last_sightings import LastSighting
+from server.service.other_sites.linked_site import LinkedSite
 from server.service.other_sites.people_here import PeopleHere
 
 log = logging.getLogger(__name__)
@@ -25,16 +26,16 @@ class NumberConflicts:
         self._messages: dict[int, int] = {}
         """By number, messages in a row that say a person is at another site, too."""
 
-    def check(self, site: LinkedSite, person: PersonElsewhere, *, leads: bool) -> bool:
-        """Return whether a person of a message is here, too; the leading service may renumber them."""
-        number = self._people.registry.current(person.number)
+    def check(self, site: LinkedSite, sighting: LastSighting, *, leads: bool) -> bool:
+        """Return whether whom a site says it sees is here, too; the leading service may renumber them."""
+        number = self._people.registry.current(sighting.number)
         arrived = self._here.arrived(number)
-        if person.stay_s is None or arrived is None:
+        if sighting.stay_s is None or arrived is None:
             self._messages.pop(number, None)
             return False
         self._messages[number] = self._messages.get(number, 0) + 1
         stay_s = (self._people.newest - arrived) / self._config.site.fps
-        longer_s = person.stay_s - stay_s
+        longer_s = sighting.stay_s - stay_s
         arrived_later = longer_s > _STAY_MARGIN_S or (
             longer_s >= -_STAY_MARGIN_S and site.index < self._config.sites.index
         )

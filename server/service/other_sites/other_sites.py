@@ -30,15 +30,10 @@ from server.service.identity.person_tracker import PersonTracker
 from server.service.identity.state_recovery import SINGLE_CAMERA_NUMBER_MAX
 from server.service.identity.state_replication import StateReplication
 from server.service.other_sites.deletions import SiteDeletions
+from server.service.other_sites.last_sightings import LastSighting, LastSightings
+from server.service.other_sites.linked_site import SILENT_S, LinkedSite, population_of
 from server.service.other_sites.number_conflicts import NumberConflicts
 from server.service.other_sites.numbering_ledger import NumberingLedger
-from server.service.other_sites.people_elsewhere import (
-    SILENT_S,
-    LinkedSite,
-    PeopleElsewhere,
-    PersonElsewhere,
-    population_of,
-)
 from server.service.other_sites.people_here import PeopleHere
 from server.service.other_sites.people_publisher import PeoplePublisher
 from server.service.pulse_follower import PulseFollower
@@ -70,7 +65,7 @@ class OtherSites:
         self._replication, self._bus, self._clock = replication, bus, clock
         self._pulses = pulses
         self.sites = {name: LinkedSite(name, link) for name, link in settings.link.items()}
-        self.elsewhere = PeopleElsewhere(settings.people_max)
+        self.last_sightings = LastSightings(settings.people_max)
         self._here = PeopleHere(people, config.site.fps)
         self.publisher = PeoplePublisher(config, people, self._here, bus)
         self._conflicts = NumberConflicts(config, people, self._here)
@@ -111,7 +106,7 @@ class OtherSites:
         self._here.update(found)
         self._follow_silent_sites(now)
         there = [name for name, site in self.sites.items() if site.is_there(now)]
-        dropped = self.elsewhere.drop(there, now)
+        dropped = self.last_sightings.drop(there, now)
         self._forget([number for number in dropped if number not in self._people.registry.first_seen])
         since = self._state_replication.numbers_since
         if self._replication.leads and since:
@@ -150,16 +145,16 @@ class OtherSites:
         if (pulse := self._pulse) >= 0:
             self._add_people(site, report, pulse, now)
 
-    def whereabouts(self) -> list[PersonElsewhere]:
-        """Return who was seen last by another site that is there, by number."""
+    def whereabouts(self) -> list[LastSighting]:
+        """Return the last sightings of who was seen last by another site that is there, by number."""
         now, found = self._clock(), {}
-        for person in self.elsewhere.by_number.values():
-            number = self._people.registry.current(person.number)
+        for sighting in self.last_sightings.by_number.values():
+            number = self._people.registry.current(sighting.number)
             last = self._people.registry.last_seen.get(number)
-            is_here = self._here.arrived(number) is not None or (last is not None and person.frame <= last)
-            if self.sites[person.site].is_there(now) and not is_here:
-                found[number] = replace(person, number=number)
-        return [person for _, person in sorted(found.items())]
+            is_here = self._here.arrived(number) is not None or (last is not None and sighting.frame <= last)
+            if self.sites[sighting.site].is_there(now) and not is_here:
+                found[number] = replace(sighting, number=number)
+        return [sighting for _, sighting in sorted(found.items())]
 
     def numbered_since(self, number: int) -> float:
         """Return since when a number means one person, here and at its site; infinite: unknown."""
@@ -208,31 +203,32 @@ class OtherSites:
         if site.population is None or report.population is not None:
             site.population = population_of(report)
         gone = self._state_replication.deleted(self._state_replication.numbers_since)
-        people = [
-            person
-            for person in self.elsewhere.put(site, report, pulse, self._config.site.fps, now)
-            if person.number not in gone
+        newest = [
+            sighting
+            for sighting in self.last_sightings.put(site, report, pulse, self._config.site.fps, now)
+            if sighting.number not in gone
         ]
-        self.elsewhere.forget(gone)
-        own = [person.number for person in people if self._people.ids.has(person.number)]
+        self.last_sightings.forget(gone)
+        own = [sighting.number for sighting in newest if self._people.ids.has(sighting.number)]
         most = max(SINGLE_CAMERA_NUMBER_MAX, self._people.identity.next_id)
         self._people.identity.reserve_below(min(max(own, default=0) + 1, most))
-        histograms = self.elsewhere.histograms_of(site, report.histograms)
+        histograms = self.last_sightings.histograms_of(site, report.histograms)
         sightings = [
-            person.sighting(histograms.pop(person.number, None))
-            for person in people
-            if not self._conflicts.check(site, person, leads=self._replication.leads)
+            sighting.for_registry(histograms.pop(sighting.number, None))
+            for sighting in newest
+            if not self._conflicts.check(site, sighting, leads=self._replication.leads)
         ]
         sightings += [
-            self.elsewhere.by_number[number].sighting(histogram) for number, histogram in histograms.items()
+            self.last_sightings.by_number[number].for_registry(histogram)
+            for number, histogram in histograms.items()
         ]
         populations = {} if site.population is None else {site.name: site.population}
-        self._people.identity.add_remote_sightings(sightings, populations)
+        self._people.identity.add_site_sightings(sightings, populations)
 
     def _forget_numbers_of(self, index: int) -> None:
         """Forget people of a site whose numbers have begun anew, but who is here: it will not use theirs."""
         series = replace(self._people.ids, index=index)
-        known = [*self._people.registry.all_numbers, *self.elsewhere.by_number]
+        known = [*self._people.registry.all_numbers, *self.last_sightings.by_number]
         numbers = sorted(
             {number for number in known if series.has(number) and self._here.arrived(number) is None}
         )
@@ -241,15 +237,15 @@ class OtherSites:
 
     def _forget(self, numbers: Iterable[int]) -> None:
         gone = list(numbers)
-        self.elsewhere.forget(gone)
+        self.last_sightings.forget(gone)
         if gone:
             self._people.identity.forget(gone)
 
     def _follow_silent_sites(self, now: float) -> None:
         for site in self.sites.values():
             if site.heard_at is not None and not site.is_there(now, SILENT_S):
-                left = self.elsewhere.leave_silent_site(site)
-                self._people.identity.add_remote_sightings([person.sighting() for person in left], {})
+                left = self.last_sightings.leave_silent_site(site)
+                self._people.identity.add_site_sightings([sighting.for_registry() for sighting in left], {})
             elif (
                 site.heard_at is None
                 and not (site.refused or site.is_missed)

@@ -16,8 +16,8 @@ from server.messaging.site_people import (
 )
 from server.service.bus_connection import BusConnection
 from server.service.identity.person_tracker import PersonTracker
+from server.service.other_sites.linked_site import viewers_of
 from server.service.other_sites.message_builder import SiteMessageBuilder
-from server.service.other_sites.people_elsewhere import viewers_of
 from server.service.other_sites.people_here import PeopleHere, PersonHere
 
 log = logging.getLogger(__name__)

@@ -13,7 +13,7 @@ from server.messaging.camera_identity_snapshot import PERSON_NUMBER_MAX
 from server.messaging.service_record import AreaStay, ServiceRecord
 from server.service.identity.local_numbers import TrackName
 from server.service.identity.person_tracker import PersonTracker
-from server.service.identity.sharding import OtherArea, ShardingByArea
+from server.service.identity.sharding import AreaSighting, ShardingByArea
 from server.service.identity.track_parts import UNCONFIRMED
 from server.service.replication.disagreements import (
     Disagreements,
@@ -116,9 +116,9 @@ class AreaAgreement:
         others = [record for record in live if self.is_other(record)]
         of = self._share.of
         last_area_first = sorted(others, key=lambda record: record.service % of, reverse=True)
-        area.set_other_areas(
+        area.set_sightings(
             {
-                number: OtherArea(record.service % of, stay.here, record.pulse - stay.here <= self._unseen)
+                number: AreaSighting(record.service % of, stay.here, record.pulse - stay.here <= self._unseen)
                 for record in last_area_first
                 for number, stay in record.in_area.items()
             }

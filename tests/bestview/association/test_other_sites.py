@@ -16,7 +16,7 @@ from bestview import (
     IdentityUpdate,
     IdSeries,
     Person,
-    RemoteSighting,
+    SiteSighting,
 )
 from bestview.association.affinity.travel_times import CameraSighting
 from bestview.association.appearance.histograms import (
@@ -68,7 +68,7 @@ class Site:
             self.registry.mean_histograms([person.person_id for person in own]) if with_histograms else {}
         )
         sightings = [
-            RemoteSighting(
+            SiteSighting(
                 person.person_id,
                 self.name,
                 person.camera,
@@ -78,7 +78,7 @@ class Site:
             )
             for person in own
         ]
-        other.registry.add_remote_sightings(sightings, {self.name: self.registry.population(BINS)})
+        other.registry.add_site_sightings(sightings, {self.name: self.registry.population(BINS)})
 
 
 def walk_between(
@@ -178,7 +178,7 @@ def test_travel_times_between_sites_tell_people_with_similar_looks_apart() -> No
     settings = replace(IdentitySettings(), appearance_gate_share=4.0)
     registry = IdentityRegistry(settings, BLIND, ids=IdSeries(1, 2))
     learned = [
-        (100 * n, RemoteSighting(2 * n + 1, "hall", "exit", 100 * n, is_visible=False, histogram=None))
+        (100 * n, SiteSighting(2 * n + 1, "hall", "exit", 100 * n, is_visible=False, histogram=None))
         for n in range(12)
     ]
     arrivals = [stay(n, 1.0 + n / 2, left + 60, left + 90) for n, (left, _) in enumerate(learned)]
@@ -188,12 +188,12 @@ def test_travel_times_between_sites_tell_people_with_similar_looks_apart() -> No
         now = count * STRIDE - 1
         for n, (left, sighting) in enumerate(learned):
             if now == left + 4:
-                registry.add_remote_sightings([replace(sighting, histogram=histogram_of(1.0 + n / 2))], {})
+                registry.add_site_sightings([replace(sighting, histogram=histogram_of(1.0 + n / 2))], {})
         if now == late + 4:
-            registry.add_remote_sightings(
+            registry.add_site_sightings(
                 [
-                    RemoteSighting(101, "hall", "exit", late, is_visible=False, histogram=histogram_of(1.5)),
-                    RemoteSighting(103, "hall", "exit", old, is_visible=False, histogram=histogram_of(1.6)),
+                    SiteSighting(101, "hall", "exit", late, is_visible=False, histogram=histogram_of(1.5)),
+                    SiteSighting(103, "hall", "exit", old, is_visible=False, histogram=histogram_of(1.6)),
                 ],
                 {},
             )
@@ -217,7 +217,7 @@ def test_series_share_no_id_and_leave_none_out(step: int, least: int) -> None:
 
 def test_ids_of_other_sites_do_not_raise_the_own_ones() -> None:
     registry = IdentityRegistry(IdentitySettings(), BLIND, ids=IdSeries(0, 2))
-    registry.add_remote_sightings([RemoteSighting(10**8, "yard", "c0", 0, is_visible=False)], {})
+    registry.add_site_sightings([SiteSighting(10**8, "yard", "c0", 0, is_visible=False)], {})
     registry.forget([10**8])
     assert registry.next_id == 1
     registry.reserve_below(8)
@@ -227,7 +227,7 @@ def test_ids_of_other_sites_do_not_raise_the_own_ones() -> None:
 @pytest.mark.parametrize("is_newer", [True, False])
 def test_merging_somebody_elsewhere_brings_no_camera_of_another_site(*, is_newer: bool) -> None:
     here, gone = Person(1, 50, "south"), Person(2)
-    gone.add_remote_sighting(RemoteSighting(2, "yard", "c0", 90 if is_newer else 10, is_visible=False))
+    gone.add_site_sighting(SiteSighting(2, "yard", "c0", 90 if is_newer else 10, is_visible=False))
     here.merge(gone)
     assert here.last_sighting == CameraSighting("south", 50)
     assert not here.elsewhere

@@ -14,7 +14,7 @@ from fakes.service.scripted_cameras import CAMERAS, SMALL, FedService, TrackNumb
 from server.integrations.integrations import integrating
 from server.integrations.mqtt.site_state import person_key
 from server.messaging.messages import Box
-from server.service.identity.sharding import OtherArea, ShardingByArea
+from server.service.identity.sharding import AreaSighting, ShardingByArea
 from server.service.service import BestViewService
 
 pytestmark = [needs_mosquitto]
@@ -60,8 +60,11 @@ class TwoServices:
             there = [dict(area.present) for area in self.areas()]
             for index, area in enumerate(self.areas()):
                 other = 1 - index
-                area.set_other_areas(
-                    {number: OtherArea(other, here, is_visible=True) for number, here in there[other].items()}
+                area.set_sightings(
+                    {
+                        number: AreaSighting(other, here, is_visible=True)
+                        for number, here in there[other].items()
+                    }
                 )
 
     def name(self, number: int, name: str) -> None:

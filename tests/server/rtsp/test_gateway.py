@@ -36,7 +36,7 @@ from fakes.system.ports import free_port
 from fakes.timeouts import PATIENCE
 from server.media.picture import Codec
 from server.messaging.epochs import end_of_epoch
-from server.service.identity.sharding import OtherArea, ShardingByArea
+from server.service.identity.sharding import AreaSighting, ShardingByArea
 
 pytestmark = needs_gstreamer
 
@@ -331,9 +331,9 @@ async def test_a_client_stays_when_somebody_walks_into_another_area(
             assert isinstance(area, ShardingByArea)
             await more(frames, FPS)
             assert east.service.splicer.viewers == 0
-            area.set_other_areas({1: OtherArea(1, 1_000_000, is_visible=True)})
+            area.set_sightings({1: AreaSighting(1, 1_000_000, is_visible=True)})
             # The other service says so from now on.
-            monkeypatch.setattr(area, "set_other_areas", lambda _: None)
+            monkeypatch.setattr(area, "set_sightings", lambda _: None)
             await until(lambda: east.service.splicer.viewers == 1)
             await more(frames, 2 * FPS)
             assert len(await frames_of(gateway.url("/objects/1", token_of("family")), 3)) == 3, "from there"

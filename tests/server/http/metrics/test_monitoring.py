@@ -20,7 +20,7 @@ from fakes.service.fed_site import ServedSite
 from fakes.service.scripted_cameras import CAMERAS, camera_tracks, status, tracks
 from server.config.sections import LinkSettings
 from server.service.ingest.camera_state import Unavailability
-from server.service.other_sites.people_elsewhere import LinkedSite
+from server.service.other_sites.linked_site import LinkedSite
 
 SEVERITIES = {"critical", "warning", "info"}
 

@@ -22,7 +22,7 @@ from server.messaging.messages import CameraTracks
 from server.messaging.observations import FrameObservations, unpack_observations
 from server.messaging.packed_arrays import pack_detections, pack_histograms
 from server.service.identity.service_area import ServiceArea, ingest_area
-from server.service.identity.sharding import OtherArea, ShardingByArea, TracksOfPeople
+from server.service.identity.sharding import AreaSighting, ShardingByArea, TracksOfPeople
 from server.service.service import BestViewService
 from server.system.errors import UserError
 
@@ -97,11 +97,11 @@ class TwoAreas:
         """Show both services person 7 in some cameras; return in which areas the person is."""
         for index, area in enumerate(self.areas):
             other = {
-                number: OtherArea(1 - index, last, is_visible=True)
+                number: AreaSighting(1 - index, last, is_visible=True)
                 for number, last in self.areas[1 - index].present.items()
             }
             area.update([TracksOfPeople(message, [7]) for message in seen], frame)
-            area.set_other_areas(other)
+            area.set_sightings(other)
         return [index for index, area in enumerate(self.areas) if area.own([7], {})]
 
 
@@ -211,7 +211,7 @@ async def west_service() -> AsyncIterator[str]:
         service.feed(epoch, {"c0": {1: SMALL}})
     area = service.decider.people.sharding
     assert isinstance(area, ShardingByArea)
-    area.set_other_areas({2: OtherArea(1, 0, is_visible=True), 4: OtherArea(1, 0, is_visible=False)})
+    area.set_sightings({2: AreaSighting(1, 0, is_visible=True), 4: AreaSighting(1, 0, is_visible=False)})
     async with serving(make_app(BestViewService(service)), HttpSettings(port=0)) as port:
         yield f"http://127.0.0.1:{port}"
     service.close()
@@ -234,8 +234,8 @@ def test_who_leaves_the_area_is_listed_here_or_there_and_never_in_both() -> None
         service.feed(epoch, {"c0": {1: SMALL}})
     area = service.decider.people.sharding
     assert isinstance(area, ShardingByArea)
-    there = {1: OtherArea(1, 1_000_000, is_visible=True)}
-    area.set_other_areas(there)
+    there = {1: AreaSighting(1, 1_000_000, is_visible=True)}
+    area.set_sightings(there)
 
     def listed() -> tuple[list[int], list[int]]:
         found = objects_info(BestViewService(service))
@@ -246,7 +246,7 @@ def test_who_leaves_the_area_is_listed_here_or_there_and_never_in_both() -> None
     assert area.own([1], {}) == [], "released, which no decision has taken in"
     assert listed() == ([1], [])
     service.feed(4, {"c0": {}})
-    area.set_other_areas(there)
+    area.set_sightings(there)
     assert listed() == ([], [1])
     service.close()
 

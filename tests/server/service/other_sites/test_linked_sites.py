@@ -15,14 +15,14 @@ from server.messaging.inbox import Message
 from server.messaging.messages import ZenohKeys
 from server.messaging.site_people import (
     MESSAGE_BYTES_MAX,
+    SightingRow,
     SitePeople,
-    SiteSighting,
     pack_sightings,
     unpack_sightings,
 )
 from server.service.identity.state_recovery import state_for_cameras
+from server.service.other_sites.linked_site import HEARD_S, SILENT_S
 from server.service.other_sites.other_sites import UNHEARD_S
-from server.service.other_sites.people_elsewhere import HEARD_S, SILENT_S
 
 A, B = 1, 4
 KEYS = ZenohKeys("yard")
@@ -222,11 +222,11 @@ async def test_a_number_of_another_site_is_restored_and_raises_no_own_one(sites:
 async def test_people_of_other_sites_are_bounded() -> None:
     with linked_sites(sites={"people_max": 3}) as sites:
         sites.walk(3)
-        rows = [SiteSighting(3 * n + 1, "c0", float(n), None) for n in range(200)]
+        rows = [SightingRow(3 * n + 1, "c0", float(n), None) for n in range(200)]
         deliver(sites, rows)
         sites.walk(2)
         yard = sites.running["yard"]
-        assert sorted(yard.other_sites.elsewhere.by_number) == [1, 4, 7]
+        assert sorted(yard.other_sites.last_sightings.by_number) == [1, 4, 7]
         assert [person.person_id for person in yard.decider.people.identity.people] == [1, 4, 7]
 
 
@@ -244,13 +244,13 @@ async def test_damaged_messages_are_counted_and_dropped(sites: LinkedSites) -> N
         yard.receive("hall", Message(ZenohKeys("hall").bestview("people"), payload, b""))
     assert yard.bad_messages == 3
     message = SitePeople(index=0, of=3, numbered_since=1.0, cameras=["c0"], people=b"")
-    double = pack_sightings([SiteSighting(1, "c0", 0.0, None)] * 2, ["c0"])
+    double = pack_sightings([SightingRow(1, "c0", 0.0, None)] * 2, ["c0"])
     damaged = msgspec.structs.asdict(message) | {"people": double}
     with pytest.raises(msgspec.ValidationError, match="a person has two sightings"):
         msgspec.msgpack.decode(msgspec.msgpack.encode(damaged), type=SitePeople)
 
 
-def deliver(sites: LinkedSites, rows: list[SiteSighting]) -> None:
+def deliver(sites: LinkedSites, rows: list[SightingRow]) -> None:
     since = sites.running["hall"].state_replication.numbers_since
     message = SitePeople(
         index=0, of=3, numbered_since=since or 1.0, cameras=["c0"], people=pack_sightings(rows, ["c0"])
