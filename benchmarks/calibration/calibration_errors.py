@@ -44,8 +44,8 @@ class CameraOverlap:
     Attributes:
         people: number of people that both show in the same frame.
         boxes: number of their untruncated boxes.
-        residual: median distance of their foot points from a plane fitted to the nearer half of them, in
-            heights of the other camera's boxes; NaN if there are too few, or all are on a line.
+        residual: least median distance of their foot points from a plane, in heights of the other camera's
+            boxes; NaN if there are too few, or all are on a line.
     """
 
     people: int
@@ -99,23 +99,44 @@ def camera_overlaps(
 
 
 def _plane_residual(here: Floats, there: Floats) -> float:
-    """Fit a plane to the nearer half repeatedly (least trimmed squares), starting with all points."""
+    """Return the least median distance from a plane (least median of squares: Rousseeuw, 1984).
+
+    The plane through all points, and the best of those through four random ones, are fitted repeatedly to
+    the nearer half. From the first alone the fit ends elsewhere if many people sit and their feet are hidden.
+    """
     source, target, heights = foot_points(here), foot_points(there), there[:, 3] - there[:, 1]
-    kept = np.ones(len(here), dtype=bool)
-    median = float("nan")
-    for _ in range(_TRIMS):
-        try:
-            plane = fit_homography(source[kept], target[kept])
-        except ValueError:
-            return median
-        distances = np.nan_to_num(
-            np.hypot(*(apply_homography(plane, source) - target).T) / heights, nan=np.inf
-        )
-        median = float(np.nanmin([median, np.median(distances)]))
-        kept = distances <= np.median(distances)
-    return median
+    if len(source) < _CORNERS:
+        return float("nan")
+    random = np.random.default_rng(0)
+    sampled = min(
+        (
+            _plane_distances(source, target, heights, random.choice(len(source), _CORNERS, replace=False))
+            for _ in range(_SAMPLES)
+        ),
+        key=np.median,
+    )
+    least = np.inf
+    for start in (_plane_distances(source, target, heights, np.arange(len(source))), sampled):
+        distances = start
+        least = min(least, float(np.median(distances)))
+        for _ in range(_TRIMS):
+            nearer = np.flatnonzero(distances <= np.median(distances))
+            distances = _plane_distances(source, target, heights, nearer)
+            least = min(least, float(np.median(distances)))
+    return least if np.isfinite(least) else float("nan")
 
 
+def _plane_distances(source: Floats, target: Floats, heights: Floats, fitted: NDArray[np.intp]) -> Floats:
+    """Return the distances of all points from the plane through some, in box heights; infinite: no plane."""
+    try:
+        plane = fit_homography(source[fitted], target[fitted])
+    except ValueError:
+        return np.full(len(source), np.inf)
+    return np.nan_to_num(np.hypot(*(apply_homography(plane, source) - target).T) / heights, nan=np.inf)
+
+
+_CORNERS, _SAMPLES = 4, 500
+"""Points through which a plane is fitted, and how often: two dozen times all four are of the nearer half."""
 _TRIMS = 20
 
 _Boxes = Mapping[tuple[int, int], tuple[float, float, float, float]]

@@ -44,6 +44,22 @@ def test_a_plane_is_fitted_despite_hidden_feet_and_people_at_other_times_do_not_
         assert np.isnan(overlaps[other, "later"].residual)
 
 
+def test_a_plane_is_fitted_despite_people_who_sit_in_a_row_with_hidden_feet(tmp_path: Path) -> None:
+    random = np.random.default_rng(3)
+    walked, row = (
+        random.uniform((100, 300), (500, 400), (60, 2)),
+        random.uniform((480, 100), (500, 110), (50, 2)),
+    )
+    feet = np.concatenate([walked, row])
+    write_truth(tmp_path, "a", range(110), feet)
+    seen = 640 - feet
+    seen[60:] -= (0, 5 * HEIGHT)
+    write_truth(tmp_path, "b", range(110), seen)
+    assert camera_overlaps(tmp_path, ("a", "b"), (640, 700))["a", "b"].residual == pytest.approx(
+        0.0, abs=1e-6
+    )
+
+
 def test_no_plane_fits_feet_that_are_hidden_at_random(tmp_path: Path) -> None:
     random = np.random.default_rng(2)
     feet = random.uniform((100, 100), (500, 300), (80, 2))
