@@ -81,6 +81,11 @@ BENCHMARKS = (
     Benchmark("overload", "more cameras than the machine can handle, and recovery; up to 15 minutes"),
     Benchmark("overload.responsiveness", "response times of an overloaded site; 7 minutes"),
     Benchmark("calibration", "accuracy of cameras calibrated from walking people; 5 minutes"),
+    Benchmark(
+        "calibration.coincidence",
+        "pairs of cameras that it keeps and refuses, rightly and wrongly; 6 minutes",
+        ("--recording", "terrace"),
+    ),
     Benchmark("scaling", "many simulated cameras on one best-view process; 4 minutes"),
     Benchmark("scaling.areas", "a site that is divided by area, over 1 to 8 services; 8 minutes"),
     Benchmark("streaming", "splicing, viewers and HLS delay, beside ffmpeg and nginx; 6 minutes"),

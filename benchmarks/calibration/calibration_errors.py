@@ -132,7 +132,8 @@ def _plane_distances(source: Floats, target: Floats, heights: Floats, fitted: ND
         plane = fit_homography(source[fitted], target[fitted])
     except ValueError:
         return np.full(len(source), np.inf)
-    return np.nan_to_num(np.hypot(*(apply_homography(plane, source) - target).T) / heights, nan=np.inf)
+    distances = np.hypot(*(apply_homography(plane, source) - target).T) / heights
+    return np.asarray(np.nan_to_num(distances, nan=np.inf))
 
 
 _CORNERS, _SAMPLES = 4, 500
