@@ -244,7 +244,7 @@ def main() -> int:
     words.add_argument(
         "--image", default="myview", help="(myview); the RTSP gateway's has -rtsp after the name"
     )
-    words.add_argument("--services", type=int, help="best-view services; by default as view.share says")
+    words.add_argument("--services", type=int, help="best-view services; by default as view.sharding says")
     words.add_argument(
         "--url", action="append", default=[], help="where viewers reach the services, or each of them"
     )

@@ -148,7 +148,7 @@ def read_site(path: Path, urls: list[str], services: int | None) -> ContainerSit
             raise UserError(f"--url {url}: is not an address such as https://cameras.example, without a path")
     content = _copied(read_content(path))
     config = build_config(content, where=str(path), folder=path.parent)
-    count = config.view.share.services if services is None else services
+    count = config.view.sharding.services if services is None else services
     secret_files: dict[Place, Path] = {}
     for place in _USED_BY:
         _move_secret(content, place, path.parent, secret_files)
@@ -164,11 +164,11 @@ def read_site(path: Path, urls: list[str], services: int | None) -> ContainerSit
     is_private |= any(_is_address(source) for source in _sources(config))
     _set_addresses(content, config, count, urls)
     site = ContainerSite(config, content, texts, count, is_private, moved, secret_files)
-    share = build_config({**content, "ground": None}, where=str(path), folder=path.parent).view.share
-    if share.services != count or len(urls) not in {0, 1, count} or (share.of > 1 and len(urls) == 1):
+    sharding = build_config({**content, "ground": None}, where=str(path), folder=path.parent).view.sharding
+    if sharding.services != count or len(urls) not in {0, 1, count} or (sharding.of > 1 and len(urls) == 1):
         raise UserError(
-            f"{count} best-view services, view.share.of {share.of}, {len(urls)} --url: there must be a "
-            "multiple of the shares, and an address for each service, or, without shares, one for all"
+            f"{count} best-view services, view.sharding.of {sharding.of}, {len(urls)} --url: there must be a "
+            "multiple of the shards, and an address for each service, or, without shards, one for all"
         )
     if config.sites.link and not site.is_open:
         raise UserError(
@@ -197,12 +197,12 @@ def _set_addresses(content: Content, config: Config, services: int, urls: list[s
     content.setdefault("zenoh", {}).update({"connect": routers, "listen": listen})
     content.setdefault("http", {}).update({"host": _EVERY_ADDRESS, "port": HTTP_PORT})
     scheme = _http_scheme(config)
-    share = content.setdefault("view", {}).setdefault("share", {})
-    share["index"] = 0  # each service has its own, from the environment
+    sharding = content.setdefault("view", {}).setdefault("sharding", {})
+    sharding["index"] = 0  # each service has its own, from the environment
     inside = [f"{scheme}://{host}:{HTTP_PORT}/" for host in service_hosts(services)]
     if len(urls) == 1:
         content["http"].setdefault("public_url", urls[0])
-    share["servers"] = [] if services == 1 else urls * services if len(urls) == 1 else urls or inside
+    sharding["servers"] = [] if services == 1 else urls * services if len(urls) == 1 else urls or inside
     access = content.setdefault("access", {})
     if config.access.tokens is None:
         access["open_to_all"] = True

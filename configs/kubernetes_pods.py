@@ -204,7 +204,7 @@ def bestview(site: ContainerSite, image: str) -> Manifest:
         ["bestview"],
         site.secret_names("bestview"),
         image=image,
-        env=[*_variables(), {"name": "MYVIEW_VIEW__SHARE__INDEX", "valueFrom": index}],
+        env=[*_variables(), {"name": "MYVIEW_VIEW__SHARDING__INDEX", "valueFrom": index}],
         ports=[{"name": "http", "containerPort": HTTP_PORT}, {"name": "bus", "containerPort": BUS_PORT}],
         startupProbe=get("/healthz", periodSeconds=2, timeoutSeconds=5, failureThreshold=90),
         readinessProbe=get("/readyz", periodSeconds=2, timeoutSeconds=2, failureThreshold=2),

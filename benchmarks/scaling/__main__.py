@@ -142,7 +142,7 @@ def measure(options: argparse.Namespace) -> None:
             hall = SimulatedHall(cameras, options.people)
             settle, epochs = (_QUICK_SETTLE, _QUICK_EPOCHS) if quick else (_SETTLE, _EPOCHS)
             loads.append(
-                measure_load(hall, fps, Path(temporary) / f"{cameras}", settle, epochs, options.share)
+                measure_load(hall, fps, Path(temporary) / f"{cameras}", settle, epochs, options.services)
             )
             report.line(f"{cameras} cameras: {loads[-1].milliseconds:.1f} ms a frame")
     describe(report, loads)
@@ -156,7 +156,7 @@ def main() -> None:
     options.add_argument("--quick", action="store_true", help="two small sites, briefly")
     options.add_argument("--cameras", type=int, action="append", help="only this number; may be repeated")
     options.add_argument("--people", type=int, default=30, help="in each camera's view, on average")
-    options.add_argument("--share", type=int, default=1, help="best-view services that share the site")
+    options.add_argument("--services", type=int, default=1, help="best-view services that divide the site")
     options.add_argument("--fps", type=float, help="pulses a second; without it, fewer for large sites")
     measure(options.parse_args())
 

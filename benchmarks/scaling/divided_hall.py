@@ -71,7 +71,7 @@ def observe(hall: SimulatedHall, epochs: int) -> list[Observed]:
 
 
 def divide(hall: SimulatedHall, services: int) -> list[dict[str, Any]]:
-    """Return the setting `view.share.areas` of so many services; empty: one has the whole hall."""
+    """Return the setting `view.sharding.areas` of so many services; empty: one has the whole hall."""
     if services == 1:
         return []
     grounds = dict(zip(hall.ids, hall.grounds, strict=True))
@@ -132,13 +132,13 @@ class DividedService:
     def __init__(
         self, hall: SimulatedHall, index: int, areas: Sequence[dict[str, Any]], exchange: _Exchange
     ) -> None:
-        share = {"of": len(areas), "index": index, "areas": areas} if areas else {}
+        sharding = {"of": len(areas), "index": index, "areas": areas} if areas else {}
         config = Config.model_validate(
             {
                 "site": {"name": "hall", "fps": FPS, "width": WIDTH, "height": HEIGHT},
                 "track": {"joint": False},
                 "cameras": [{"id": camera, "source": f"rtsp://{camera}/"} for camera in hall.ids],
-                "view": {"share": share},
+                "view": {"sharding": sharding},
             }
         ).of_service()
         self.cameras = config.camera_ids

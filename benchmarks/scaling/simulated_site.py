@@ -142,7 +142,7 @@ def _running(hall: SimulatedHall, fps: float, folder: Path, services: int) -> It
         for index, port in enumerate(https):
             times = folder / f"times{index}.json"
             own = {
-                "MYVIEW_VIEW__SHARE__INDEX": f"{index}",
+                "MYVIEW_VIEW__SHARDING__INDEX": f"{index}",
                 "MYVIEW_HTTP__PORT": f"{port}",
                 "MYVIEW_ZENOH__LISTEN": routers[index],
             }
@@ -178,7 +178,7 @@ def _write_configs(
         "zenoh": {"connect": routers, "listen": routers[0]},
         "track": {"joint": False},  # simulated cameras send tracks alone
         # Slower pulses are later than the service expects.
-        "view": {"late_after_s": 12.5 / fps, "share": {"of": services}},
+        "view": {"late_after_s": 12.5 / fps, "sharding": {"of": services}},
         "cameras": [
             {"id": name, "source": f"rtsp://{name}/", "ground": ground.tolist()}
             for name, ground in zip(hall.ids, hall.grounds, strict=True)

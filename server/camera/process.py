@@ -144,7 +144,7 @@ class CameraProcess:
 
         Once one is there, the others are not waited for long: they may be down.
         """
-        services = self._config.view.share.services
+        services = self._config.view.sharding.services
         present, first, every = set[str](), asyncio.Event(), asyncio.Event()
 
         def on_service(key: str, is_present: bool) -> None:

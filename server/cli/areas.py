@@ -21,7 +21,7 @@ def areas(
     config: Annotated[Path, typer.Argument(metavar="CONFIG", help="The site's configuration, a YAML file.")],
     of: Annotated[int, typer.Option("--of", min=2, max=64, help="How many best-view services.")] = 2,
 ) -> None:
-    """Print how best-view services can divide a site by area: the setting view.share."""
+    """Print how best-view services can divide a site by area: the setting view.sharding."""
     import numpy as np
     import yaml
 
@@ -43,7 +43,7 @@ def areas(
         raise UserError(f"{config}: {error}") from error
     units = {UNITS_PER_METER.get(camera.ground_unit or "") for camera in site.cameras if camera.ground}
     unit = units.pop() if len(units) == 1 else None
-    share = {
+    sharding = {
         "of": of,
         "areas": [
             {
@@ -59,7 +59,9 @@ def areas(
         typer.echo(
             "# margin: in units of the ground, which are not known: as far as people walk in 3 seconds"
         )
-    typer.echo(yaml.safe_dump({"view": {"share": share}}, sort_keys=False, default_flow_style=None).rstrip())
+    typer.echo(
+        yaml.safe_dump({"view": {"sharding": sharding}}, sort_keys=False, default_flow_style=None).rstrip()
+    )
 
 
 def _picture_size(site: Config, camera: str) -> tuple[int, int]:

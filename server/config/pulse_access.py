@@ -20,7 +20,7 @@ def bestview_client_name(index: int) -> str:
 
 def pulse_clients(config: Config) -> tuple[str, ...]:
     """Return the names of all clients of a site's pulse server: its cameras and its best-view services."""
-    return (*config.site_camera_ids, *map(bestview_client_name, range(config.view.share.services)))
+    return (*config.site_camera_ids, *map(bestview_client_name, range(config.view.sharding.services)))
 
 
 def pulse_users(config: Config) -> dict[str, str] | None:

@@ -113,10 +113,10 @@ class Config(BaseSettings):
     def _sites_fit(self) -> Self:
         if self.site.name in self.sites.link:
             raise ValueError(f"sites.link: {self.site.name!r} is this site; name the others")
-        if gcd(self.sites.of, self.view.share.of) > 1:
+        if gcd(self.sites.of, self.view.sharding.of) > 1:
             raise ValueError(
-                f"sites.of: {self.sites.of} and view.share.of {self.view.share.of} have a common divisor: "
-                "some shares would have nobody; set a larger sites.of, in all sites"
+                f"sites.of: {self.sites.of} and view.sharding.of {self.view.sharding.of} have a common "
+                "divisor: some shards would have nobody; set a larger sites.of, in all sites"
             )
         return self
 
@@ -133,20 +133,20 @@ class Config(BaseSettings):
 
     @model_validator(mode="after")
     def _areas_have_all_cameras(self) -> Self:
-        areas = self.view.share.areas
+        areas = self.view.sharding.areas
         if areas and self.sites.of > 1:
-            raise ValueError("view.share.areas: a site that is linked to others (sites) cannot have areas")
+            raise ValueError("view.sharding.areas: a site that is linked to others (sites) cannot have areas")
         named = {camera for area in areas for camera in area.cameras}
         for camera in sorted(named.difference(self.camera_ids)):
             known = ", ".join(self.camera_ids)
-            raise ValueError(f"view.share.areas: there is no camera {camera!r}; there are {known}")
+            raise ValueError(f"view.sharding.areas: there is no camera {camera!r}; there are {known}")
         for rule in self.rules if areas else ():
             if not any(set(rule.cameras) <= {*area.cameras, *area.also} for area in areas):
-                raise ValueError(f"rules: {rule.id}: no area has all of its cameras (view.share.areas)")
+                raise ValueError(f"rules: {rule.id}: no area has all of its cameras (view.sharding.areas)")
         for camera in self.camera_ids if areas else ():
             if camera not in named:
                 raise ValueError(
-                    f"view.share.areas: camera {camera} is in none; name it in that of its place"
+                    f"view.sharding.areas: camera {camera} is in none; name it in that of its place"
                 )
         return self
 
@@ -272,7 +272,7 @@ class Config(BaseSettings):
 
     def of_service(self) -> Self:
         """Return the configuration of this best-view service, with the cameras and zones of its area."""
-        taken = self.view.share.cameras
+        taken = self.view.sharding.cameras
         if taken is None or self._of_site is not None:
             return self
         zones = [zone for zone in self.zones if zone.camera is None or zone.camera in taken]
@@ -292,7 +292,7 @@ class Config(BaseSettings):
     @property
     def person_numbers(self) -> IdSeries:
         """The person numbers that this service assigns."""
-        return self.view.share.ids if self.view.share.areas else self.sites.ids
+        return self.view.sharding.ids if self.view.sharding.areas else self.sites.ids
 
     @property
     def site_camera_ids(self) -> Sequence[str]:

@@ -107,7 +107,7 @@ def make_app(
     config = service.config
     authenticator = Authenticator(
         config.access.tokens,
-        f"{config.site.name}_{config.view.share.index}",
+        f"{config.site.name}_{config.view.sharding.index}",
         numbered_since=service.people.numbered_since,
     )
     app[ACCESS] = AccessControl(authenticator, service.people.current_number, config.access.blur)

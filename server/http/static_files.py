@@ -38,7 +38,7 @@ def page_file(name: str, servers: Sequence[str] = ()) -> web.FileResponse:
 @routes.get("/")
 async def get_index(request: web.Request) -> web.StreamResponse:
     """Return the page."""
-    return page_file("index.html", request.app[SERVICE].config.view.share.servers)
+    return page_file("index.html", request.app[SERVICE].config.view.sharding.servers)
 
 
 @routes.get("/page/{file:.+}")

@@ -32,7 +32,7 @@ class Integrations:
         """Start what the configuration names, and end what it no longer names."""
         config = self._service.config
         settings = (config.mqtt, tuple(config.webhooks), config.http.public_url)
-        if settings == self._settings or not config.view.share.is_first:
+        if settings == self._settings or not config.view.sharding.is_first:
             return
         self.stop()
         self._settings = settings

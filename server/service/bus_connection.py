@@ -23,7 +23,7 @@ class BusConnection:
 
     def __init__(self, config: Config) -> None:
         self._config = config
-        self._index = config.view.share.index
+        self._index = config.view.sharding.index
         self._keys = ZenohKeys(config.site.name)
         self._bus: Bus | None = None
         self._others: Bus | None = None
@@ -55,7 +55,7 @@ class BusConnection:
         self._bus = bus = Bus.router(
             self._config.zenoh, access_control_of(self._config), len(self._config.site_camera_ids)
         )
-        taken = self._config.view.share.cameras
+        taken = self._config.view.sharding.cameras
         # One subscription for all cameras, but nothing from those of other areas.
         cameras = ["*"] if taken is None else sorted(taken)
         for camera in cameras:
@@ -82,7 +82,7 @@ class BusConnection:
         others = self._others = Bus.client(self._config.zenoh, bestview_client_name(self._index))
         alive = {
             self._keys.bestview("alive", index): index
-            for index in range(self._config.view.share.services)
+            for index in range(self._config.view.sharding.services)
             if index != self._index
         }
 

@@ -109,7 +109,7 @@ class BestViewPipeline:
             fps,
             partial(self.bus.send_to_camera, "identities"),
             sends=lambda: self.replication.leads,
-            send_to=config.view.share.keepers,
+            send_to=config.view.sharding.keepers,
             deleted=self.recording_deletion.forgotten,
         )
         self.replication = ServiceReplication(config, people, self.state_replication, self.bus)
@@ -339,7 +339,7 @@ class BestViewPipeline:
 
     def _evaluate_rules(self, decision: GopDecision) -> list[SiteEvent]:
         """Evaluate the rules and publish events; of several services with the same people one does."""
-        if not self.config.view.share.is_first:
+        if not self.config.view.sharding.is_first:
             return []
         events = self.rules.put(decision, self.decider.people.registry.names, self.pulses.pulse0)
         for event in events:

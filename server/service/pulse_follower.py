@@ -16,7 +16,7 @@ class PulseFollower:
 
     def __init__(self, config: Config) -> None:
         self._config, self._fps = config, config.site.fps
-        self._name = bestview_client_name(config.view.share.index)
+        self._name = bestview_client_name(config.view.sharding.index)
         self.newest = -1
         """The newest pulse; -1 before the first."""
         self.pulse0: float | None = None

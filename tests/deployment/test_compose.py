@@ -166,8 +166,8 @@ def test_two_services_know_each_other_and_every_process_knows_both(monkeypatch: 
         base = plain["bestview" if name == "bestview-1" else name]["environment"]
         config = _config({**base, **service["environment"]}, monkeypatch)
         assert list(config.zenoh.routers) == ["tcp/bestview:7447", "tcp/bestview-1:7447"]
-        assert config.view.share.services == 2
-        assert config.view.share.index == (name == "bestview-1")
+        assert config.view.sharding.services == 2
+        assert config.view.sharding.index == (name == "bestview-1")
         services = service["environment"]["MYVIEW_HEALTH_URL"].split(",")
         assert services == ["http://bestview:8080", "http://bestview-1:8080"]
 
@@ -239,7 +239,7 @@ def test_the_second_service_is_published_at_an_address_of_its_own(tmp_path: Path
     services = composed((PLAIN, STANDBY), tmp_path)["services"]
     ports = [services[name]["ports"][0]["published"] for name in ("bestview", "bestview-1")]
     assert ports == ["8080", "8081"]
-    urls = json.loads(services["c0"]["environment"]["MYVIEW_VIEW__SHARE__SERVERS"])
+    urls = json.loads(services["c0"]["environment"]["MYVIEW_VIEW__SHARDING__SERVERS"])
     assert urls == [f"http://127.0.0.1:{port}/" for port in ports]
 
 

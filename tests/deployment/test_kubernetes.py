@@ -207,7 +207,7 @@ def sites(draw: st.DrawFn) -> Manifest:
         "mqtt": {"host": "broker", "username": "site", "password": "file.pem"},
         "rtsp": {"enabled": True, "tls": tls},
         "record": {"folder": "recorded", "max_mb": draw(st.floats(1, 1e6))},
-        "view": {"share": {"of": draw(st.integers(1, 3))}},
+        "view": {"sharding": {"of": draw(st.integers(1, 3))}},
         "sound": {"source": f"rtsp://viewer:{SECRET}5@192.0.2.9/"},
     }
     for section in draw(st.lists(st.sampled_from(list(optional)), unique=True)):
@@ -246,14 +246,14 @@ class TestOfAnySite:
         self, folder: Path, kubernetes_validate: Any, content: Manifest, services: int
     ) -> None:
         path = write_site(folder, content)
-        count = services * content.get("view", {}).get("share", {}).get("of", 1)
+        count = services * content.get("view", {}).get("sharding", {}).get("of", 1)
         manifests, secrets = render(path, services=count), render_secrets(path, services=count)
         for made in [*manifests, *secrets]:
             kubernetes_validate.validate(made, kubernetes_validate.latest_version(), strict=True)
         check_manifests(manifests, secrets)
         assert SECRET not in yaml.safe_dump(manifests)
         config = loaded_in_containers(manifests, secrets)
-        assert config.view.share.services == count
+        assert config.view.sharding.services == count
         assert config.camera_ids == load_config(path).camera_ids
         assert of_kind(manifests, "StatefulSet")["bestview"]["spec"]["replicas"] == count
 
@@ -351,7 +351,7 @@ def test_services_replace_each_other_at_one_address_or_at_several(tmp_path: Path
     (rule,) = of_kind(one, "Ingress")["myview"]["spec"]["rules"]
     assert rule["http"]["paths"][0]["backend"]["service"]["name"] == "myview"
     assert of_kind(one, "Ingress")["myview"]["spec"]["tls"] == [{"hosts": ["cameras.example"]}]
-    assert loaded_in_containers(one, []).view.share.servers == ["https://cameras.example"] * 2
+    assert loaded_in_containers(one, []).view.sharding.servers == ["https://cameras.example"] * 2
     urls = ["http://a.example/", "http://b.example/"]
     several = render(path, urls, services=2)
     check_manifests(several, render_secrets(path, services=2))
@@ -359,12 +359,12 @@ def test_services_replace_each_other_at_one_address_or_at_several(tmp_path: Path
     backends = [rule["http"]["paths"][0]["backend"]["service"]["name"] for rule in rules]
     assert backends == ["myview-0", "myview-1"]
     config = loaded_in_containers(several, [])
-    assert config.view.share.servers == urls
+    assert config.view.sharding.servers == urls
     assert config.zenoh.routers == ("tcp/bestview-0.bestview:7447", "tcp/bestview-1.bestview:7447")
     (kubernetes_index,) = (
         variable
         for variable in container_of(of_kind(several, "StatefulSet")["bestview"])["env"]
-        if variable["name"] == "MYVIEW_VIEW__SHARE__INDEX"
+        if variable["name"] == "MYVIEW_VIEW__SHARDING__INDEX"
     )
     assert "pod-index" in kubernetes_index["valueFrom"]["fieldRef"]["fieldPath"]
 
@@ -392,7 +392,7 @@ def test_a_camera_is_not_ended_while_its_source_or_the_best_view_is_away(tmp_pat
     [
         ({"cameras": [{"id": "c0", "source": "/dev/video0"}]}, (), "device of one machine"),
         ({"cameras": []}, (), "cameras"),
-        ({"view": {"share": {"of": 2}}}, ("--services", "3"), "shares"),
+        ({"view": {"sharding": {"of": 2}}}, ("--services", "3"), "shards"),
         ({}, ("--url", "https://cameras.example/path"), "--url"),
         ({"access": {"tokens": "none.yaml"}}, ("--secrets",), "none.yaml"),
     ],

@@ -160,7 +160,7 @@ async def run_two_services(
         urls = [f"http://{address}/" for address in addresses]
         settings: dict[str, dict[str, Any]] = {
             "zenoh": {"connect": routers, "listen": routers[0]},
-            "view": {"share": {"servers": urls}},
+            "view": {"sharding": {"servers": urls}},
             "track": {"joint": joint},
             "access": {"open_to_all": True, "trusted_network": True},
         }
@@ -169,7 +169,7 @@ async def run_two_services(
             settings["sync"] = {**SETTINGS["sync"], **own}
         environments = {
             name: {
-                "MYVIEW_VIEW__SHARE__INDEX": str(index),
+                "MYVIEW_VIEW__SHARDING__INDEX": str(index),
                 "MYVIEW_ZENOH__LISTEN": routers[index],
                 "MYVIEW_HTTP__HOST": at[name],
                 "MYVIEW_HTTP__PORT": str(ports[index]),

@@ -11,7 +11,7 @@ from server.config.sections.rtsp import RtspSettings
 from server.config.sections.rules import RuleSettings, ZoneSettings, check_zones_and_rules
 from server.config.sections.site import ProcessTlsSettings, SiteSettings, SyncSettings, ZenohSettings
 from server.config.sections.sites import LinkSettings, SitesSettings, is_site_user, site_user
-from server.config.sections.view import LIVE_VIEW_SETTINGS, FlagSettings, ShareSettings, ViewSettings
+from server.config.sections.view import LIVE_VIEW_SETTINGS, FlagSettings, ShardingSettings, ViewSettings
 
 __all__ = [
     "LIVE_VIEW_SETTINGS",
@@ -32,7 +32,7 @@ __all__ = [
     "RtspSettings",
     "RuleSettings",
     "Section",
-    "ShareSettings",
+    "ShardingSettings",
     "SiteSettings",
     "SitesSettings",
     "SoundSettings",

@@ -49,14 +49,14 @@ class AreaSettings(Section):
         return self
 
 
-class ShareSettings(Section):
-    """Several best-view services of one site: for one share of the people each, and to replace each other."""
+class ShardingSettings(Section):
+    """Several best-view services of one site: for one shard of the people each, and to replace each other."""
 
     of: PositiveInt = 1
-    """Number of shares: a service decides for people whose number has its index's remainder by this. Services
-    of one share replace each other."""
+    """Number of shards: a service decides for people whose number has its index's remainder by this. Services
+    of one shard replace each other."""
     areas: list[AreaSettings] = []
-    """One for each share: a service then takes in only the cameras of its area, and decides for the people
+    """One for each shard: a service then takes in only the cameras of its area, and decides for the people
     there. None: every service takes in all cameras."""
     index: NonNegativeInt = 0
     """Index of this service."""
@@ -67,7 +67,7 @@ class ShareSettings(Section):
     def editing_blocked(self) -> str:
         """Why operators cannot change people's numbers; empty: they can."""
         if self.services > 1:
-            return "the site has several services (view.share), and their person numbers must stay equal"
+            return "the site has several services (view.sharding), and their person numbers must stay equal"
         return ""
 
     @property
@@ -76,8 +76,8 @@ class ShareSettings(Section):
         return len(self.servers) or self.of
 
     @property
-    def share(self) -> int:
-        """The share of this service."""
+    def shard(self) -> int:
+        """The shard of this service."""
         return self.index % self.of
 
     @property
@@ -90,7 +90,7 @@ class ShareSettings(Section):
         """The cameras that this service takes in; None: all."""
         if not self.areas:
             return None
-        area = self.areas[self.share]
+        area = self.areas[self.shard]
         return [*area.cameras, *area.also]
 
     @property
@@ -99,17 +99,17 @@ class ShareSettings(Section):
 
         A camera keeps it for one service.
         """
-        return self.areas[self.share].cameras if self.areas else None
+        return self.areas[self.shard].cameras if self.areas else None
 
     @property
     def ids(self) -> IdSeries:
         """The person numbers that this service assigns: each area has its own."""
-        return IdSeries(self.share, self.of) if self.areas else IdSeries()
+        return IdSeries(self.shard, self.of) if self.areas else IdSeries()
 
     @model_validator(mode="after")
     def _areas_fit(self) -> Self:
         if self.areas and len(self.areas) != self.of:
-            raise ValueError(f"areas: has {len(self.areas)}, but there are {self.of} shares (of)")
+            raise ValueError(f"areas: has {len(self.areas)}, but there are {self.of} shards (of)")
         names = [camera for area in self.areas for camera in area.cameras]
         for name in names:
             if names.count(name) > 1:
@@ -126,7 +126,7 @@ class ShareSettings(Section):
     def _fits(self) -> Self:
         if self.servers and len(self.servers) % self.of:
             raise ValueError(
-                f"servers names {len(self.servers)}, but there are {self.of} shares; "
+                f"servers names {len(self.servers)}, but there are {self.of} shards; "
                 "name as many for each, or none"
             )
         if self.index >= self.services:
@@ -185,5 +185,5 @@ class ViewSettings(Section):
     identity: Annotated[IdentitySettings, no_unknown_keys(IdentitySettings)] = IdentitySettings()
     flags: FlagSettings = FlagSettings()
     """Which of the failures that `track.assist` predicts are flagged."""
-    share: ShareSettings = ShareSettings()
+    sharding: ShardingSettings = ShardingSettings()
     """Sharding over several best-view services."""

@@ -29,7 +29,7 @@ _CAMERA_PATH = re.compile(r"/(?:api/)?cameras/([^/]+)/")
 async def redirect_to_shard(
     request: web.Request, handler: Callable[[web.Request], Awaitable[web.StreamResponse]]
 ) -> web.StreamResponse:
-    """Answer 307 with the other service's URL; 404 if view.share.servers does not name it."""
+    """Answer 307 with the other service's URL; 404 if view.sharding.servers does not name it."""
     path = _OBJECT_PATH.match(request.path)
     if path is None:
         camera = _CAMERA_PATH.match(request.path)
@@ -48,7 +48,7 @@ async def redirect_to_shard(
         return error_response(
             404,
             f"object {number} is served by best-view service {shard.index} of this site; "
-            "view.share.servers does not have its URL",
+            "view.sharding.servers does not have its URL",
         )
     return _redirect(shard.server, request, with_token=True, number=number)
 

@@ -31,7 +31,7 @@ _status_routes = web.RouteTableDef()
 @_status_routes.get("/operator")
 async def get_operator_page(request: web.Request) -> web.StreamResponse:
     """Return the operator's page; its data is fetched separately."""
-    return page_file("operator.html", request.app[SERVICE].config.view.share.servers)
+    return page_file("operator.html", request.app[SERVICE].config.view.sharding.servers)
 
 
 @_status_routes.get(f"{OPERATOR_PATH}/cameras")

@@ -29,7 +29,7 @@ routes = web.RouteTableDef()
 
 _PATH = f"{OPERATOR_PATH}/zones"
 _CHANGED = "zones or rules were changed in the configuration meanwhile: cancel, and open this again"
-_SEVERAL = "the site has several services (view.share): change zones in the file, and reload all of them"
+_SEVERAL = "the site has several services (view.sharding): change zones in the file, and reload all of them"
 
 
 class ZoneToSave(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -106,7 +106,7 @@ def _editable_path(request: web.Request) -> Path:
     Raises:
         UserError: there is none, or other services have files of their own.
     """
-    if request.app[SERVICE].config.view.share.services > 1:
+    if request.app[SERVICE].config.view.sharding.services > 1:
         raise UserError(_SEVERAL)
     return config_path(request)
 

@@ -32,8 +32,8 @@ class SiteReader:
     @property
     def area(self) -> int | None:
         """The service's area; None: it has the whole site."""
-        share = self._service.config.view.share
-        return share.share if share.areas else None
+        sharding = self._service.config.view.sharding
+        return sharding.shard if sharding.areas else None
 
     def read(self) -> SiteState:
         """Return the state now."""
@@ -42,7 +42,7 @@ class SiteReader:
         people = [person for person in people if service.people.is_reported(person.number)]
         elsewhere = self._names_elsewhere(people)
         recording = service.recordings.status
-        keepers = service.config.view.share.keepers
+        keepers = service.config.view.sharding.keepers
         return SiteState(
             site=self.site,
             people=sum(self._is_present(person) for person in people),

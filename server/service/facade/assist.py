@@ -90,8 +90,8 @@ class AssistService:
     def why_unavailable(self) -> str:
         """Why positions cannot be corrected here; empty: they can."""
         config = self._pipeline.config
-        if config.view.share.editing_blocked:
-            return config.view.share.editing_blocked
+        if config.view.sharding.editing_blocked:
+            return config.view.sharding.editing_blocked
         if not config.track.assist.enabled:
             return "cameras accept no corrections: track.assist.enabled is off"
         return ""

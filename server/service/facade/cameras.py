@@ -116,11 +116,11 @@ class CameraService:
 
     def server_of(self, camera: str) -> str | None:
         """Return the address of the service in whose area a camera is that this one does not take in."""
-        share = self._pipeline.config.view.share
+        sharding = self._pipeline.config.view.sharding
         if camera in self._pipeline.frame_buffers:
             return None
-        areas = [number for number, area in enumerate(share.areas) if camera in area.cameras]
-        return shard_address(areas[0], share) if areas else None
+        areas = [number for number, area in enumerate(sharding.areas) if camera in area.cameras]
+        return shard_address(areas[0], sharding) if areas else None
 
     def list_cameras(self) -> list[CameraInfo]:
         """Return each camera's state, as far as any viewer may know it."""

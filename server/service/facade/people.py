@@ -147,11 +147,11 @@ class PeopleService:
 
         Between two decisions another service may have taken somebody over already.
         """
-        share, people = self._pipeline.config.view.share, self._pipeline.decider.people
+        sharding, people = self._pipeline.config.view.sharding, self._pipeline.decider.people
         return [
             PersonElsewhere(
                 number,
-                shard_address(people.sharding.shard_of(number), share),
+                shard_address(people.sharding.shard_of(number), sharding),
                 visible=people.sharding.is_visible_elsewhere(number),
             )
             for number in people.of_other_shards
@@ -161,13 +161,13 @@ class PeopleService:
     @property
     def replacements(self) -> list[str]:
         """Addresses of the services that serve the same people."""
-        return replacement_addresses(self._pipeline.config.view.share)
+        return replacement_addresses(self._pipeline.config.view.sharding)
 
     def shard_of(self, number: int) -> Shard:
         """Return the service that a number belongs to, whether or not it is in use."""
-        share = self._pipeline.config.view.share
+        sharding = self._pipeline.config.view.sharding
         index = self._pipeline.decider.people.sharding.shard_of(number)
-        return Shard(index, index == share.share, shard_address(index, share), bool(share.areas))
+        return Shard(index, index == sharding.shard, shard_address(index, sharding), bool(sharding.areas))
 
     def is_reported(self, number: int) -> bool:
         """Return whether this service tells other systems about a person; of several areas the first does."""
@@ -212,7 +212,7 @@ class PeopleService:
     @property
     def editing_blocked(self) -> str:
         """Why people cannot be renamed, merged or split here; empty: they can."""
-        return self._pipeline.config.view.share.editing_blocked
+        return self._pipeline.config.view.sharding.editing_blocked
 
     def manual_overrides(self) -> PersonOverrides:
         """Return the operator's names and merges."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bestview import foot_points, to_ground
-from server.config.sections import ShareSettings
+from server.config.sections import ShardingSettings
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
 from server.messaging.messages import CameraTracks
@@ -23,18 +23,21 @@ Floats = NDArray[np.float64]
 
 
 class ServiceArea:
-    """The floor and the cameras of a service's area; its share must have one.
+    """The floor and the cameras of a service's area; its shard must have one.
 
     Args:
-        share: the site's shares.
+        sharding: how the site's services divide it.
         homographies: by camera, from its own picture to the ground; None: there is none.
         site_size: width and height of the site's pictures.
     """
 
     def __init__(
-        self, share: ShareSettings, homographies: Mapping[str, Floats | None], site_size: tuple[int, int]
+        self,
+        sharding: ShardingSettings,
+        homographies: Mapping[str, Floats | None],
+        site_size: tuple[int, int],
     ) -> None:
-        area = share.areas[share.share]
+        area = sharding.areas[sharding.shard]
         self._cameras = frozenset(area.cameras)
         self._floor = None if area.floor is None else np.array(area.floor).reshape(2, 2)
         self._margin = area.margin
@@ -103,7 +106,7 @@ def ingest_area(config: Config, homographies: Mapping[str, Floats | None]) -> Se
 
     Where viewers may see people pixelated only, everybody in a picture must be known.
     """
-    share = config.view.share
-    if not share.areas or share.areas[share.share].floor is None or config.access.may_blur:
+    sharding = config.view.sharding
+    if not sharding.areas or sharding.areas[sharding.shard].floor is None or config.access.may_blur:
         return None
-    return ServiceArea(share, homographies, config.site.size)
+    return ServiceArea(sharding, homographies, config.site.size)

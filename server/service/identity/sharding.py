@@ -1,6 +1,6 @@
 """Sharding: how the best-view services of one site divide its people, by number or by where they are.
 
-A shard is a share of the people (`view.share` of the configuration); several services may have the same.
+A shard is a share of the people (`view.sharding` of the configuration); several services may have the same.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from server.config.sections import ShareSettings
+from server.config.sections import ShardingSettings
 from server.config.site_config import Config
 from server.messaging.messages import CameraTracks
 from server.service.identity.service_area import Floats, ServiceArea
@@ -88,8 +88,8 @@ class Sharding(Protocol):
 class ShardingByNumber:
     """Divides people by number, the same in all services, without communication."""
 
-    def __init__(self, share: ShareSettings) -> None:
-        self._share = share
+    def __init__(self, sharding: ShardingSettings) -> None:
+        self._settings = sharding
 
     def own(self, numbers: Iterable[int], merged: Mapping[int, int]) -> list[int]:
         """Return the numbers of the shard.
@@ -97,9 +97,9 @@ class ShardingByNumber:
         Besides its own these are people into whom one of them was merged, so that viewers of the old number
         need not change the service.
         """
-        of, share = self._share.of, self._share.share
-        kept_numbers = {new for old, new in merged.items() if old % of == share}
-        return [number for number in numbers if number % of == share or number in kept_numbers]
+        of, shard = self._settings.of, self._settings.shard
+        kept_numbers = {new for old, new in merged.items() if old % of == shard}
+        return [number for number in numbers if number % of == shard or number in kept_numbers]
 
     def others(self, numbers: Iterable[int], merged: Mapping[int, int]) -> list[int]:
         """Return the numbers of the other shards, in the given order."""
@@ -109,7 +109,7 @@ class ShardingByNumber:
 
     def shard_of(self, number: int) -> int:
         """Return the shard of a number, whether or not it is in use."""
-        return number % self._share.of
+        return number % self._settings.of
 
     def is_visible_elsewhere(self, number: int) -> None:
         """Return None: all services have the same cameras."""
@@ -128,7 +128,7 @@ class ShardingByNumber:
         """Ignore it: nothing is known about single people."""
 
 
-SINGLE_SHARD = ShardingByNumber(ShareSettings())
+SINGLE_SHARD = ShardingByNumber(ShardingSettings())
 """A single service has all people."""
 
 
@@ -141,8 +141,8 @@ class ShardingByArea:
     have lost sight of stays with the one that has seen them last.
     """
 
-    def __init__(self, share: ShareSettings, area: ServiceArea, fps: float) -> None:
-        self._share, self._area = share, area
+    def __init__(self, sharding: ShardingSettings, area: ServiceArea, fps: float) -> None:
+        self._settings, self._area = sharding, area
         self._released_after = round(_RELEASED_AFTER_S * fps)
         self._seen: dict[int, int] = {}
         """By number, of the people in the area, the last frame in which they certainly were."""
@@ -166,7 +166,7 @@ class ShardingByArea:
     def shard_of(self, number: int) -> int:
         """Return the area where somebody is; this one if nobody else says that they are there."""
         if number in self._seen or number not in self._elsewhere:
-            return self._share.share
+            return self._settings.shard
         return self._elsewhere[number].area
 
     def is_visible_elsewhere(self, number: int) -> bool:
@@ -177,7 +177,7 @@ class ShardingByArea:
     def is_reported(self, number: int) -> bool:
         """Return whether nobody else has a person, or of all their areas this is the first."""
         other = self._elsewhere.get(number)
-        return other is None or (number in self._seen and self._share.share < other.area)
+        return other is None or (number in self._seen and self._settings.shard < other.area)
 
     def update(self, seen: Iterable[TracksOfPeople], frame: int) -> None:
         """Take over who is in the area, and release who is in another one."""
@@ -198,7 +198,7 @@ class ShardingByArea:
         other = self._elsewhere.get(number)
         if other is None or frame - last <= self._released_after:
             return False
-        return (-other.frame, other.area) < (-last, self._share.share)
+        return (-other.frame, other.area) < (-last, self._settings.shard)
 
     def set_sightings(self, sightings: Mapping[int, AreaSighting]) -> None:
         """Replace what other services say about who is in their areas, by number."""
@@ -215,21 +215,21 @@ class ShardingByArea:
 
 def create_sharding(config: Config, homographies: Mapping[str, Floats | None]) -> Sharding:
     """Return how a site's services divide its people; `homographies` by camera, from its own picture."""
-    share = config.view.share
-    if not share.areas:
-        return ShardingByNumber(share)
-    return ShardingByArea(share, ServiceArea(share, homographies, config.site.size), config.site.fps)
+    sharding = config.view.sharding
+    if not sharding.areas:
+        return ShardingByNumber(sharding)
+    return ShardingByArea(sharding, ServiceArea(sharding, homographies, config.site.size), config.site.fps)
 
 
-def replacement_addresses(share: ShareSettings) -> list[str]:
+def replacement_addresses(sharding: ShardingSettings) -> list[str]:
     """Return the addresses of the other services of this shard."""
     return [
         server.rstrip("/") + "/"
-        for index, server in enumerate(share.servers)
-        if index != share.index and index % share.of == share.share
+        for index, server in enumerate(sharding.servers)
+        if index != sharding.index and index % sharding.of == sharding.shard
     ]
 
 
-def shard_address(number: int, share: ShareSettings) -> str | None:
+def shard_address(number: int, sharding: ShardingSettings) -> str | None:
     """Return the address of the first service of a shard; None where the configuration has none."""
-    return share.servers[number].rstrip("/") + "/" if share.servers else None
+    return sharding.servers[number].rstrip("/") + "/" if sharding.servers else None

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import msgspec
 
-from server.config.sections import ShareSettings
+from server.config.sections import ShardingSettings
 from server.messaging.camera_identity_snapshot import PERSON_NUMBER_MAX
 from server.messaging.service_record import AreaStay, ServiceRecord
 from server.service.identity.local_numbers import TrackName
@@ -39,11 +39,11 @@ class AreaAgreement:
     keeps theirs.
     """
 
-    def __init__(self, share: ShareSettings, people: PersonTracker, fps: float) -> None:
-        self._share, self._people = share, people
+    def __init__(self, sharding: ShardingSettings, people: PersonTracker, fps: float) -> None:
+        self._settings, self._people = sharding, people
         self._unseen = frames_in(_VISIBLE_S, fps)
-        self._cameras = frozenset(share.cameras or ())
-        self._next_numbers = [1] * len(share.areas)
+        self._cameras = frozenset(sharding.cameras or ())
+        self._next_numbers = [1] * len(sharding.areas)
         self._last_found: dict[int, Disagreements] = {}
         """By service, what its last record would change."""
         self._changed_at = -1
@@ -53,7 +53,7 @@ class AreaAgreement:
 
     def is_other(self, record: ServiceRecord) -> bool:
         """Return whether a record is of a service of another area."""
-        return bool(self._share.areas) and record.service % self._share.of != self._share.share
+        return bool(self._settings.areas) and record.service % self._settings.of != self._settings.shard
 
     def present(self) -> dict[int, AreaStay]:
         """Return since when each person in the area has been known, by number, and was there."""
@@ -71,7 +71,7 @@ class AreaAgreement:
         """By area, the first number that was not assigned, as far as is known."""
         known = list(self._next_numbers)
         if known:
-            known[self._share.share] = min(self._people.identity.next_id, PERSON_NUMBER_MAX + 1)
+            known[self._settings.shard] = min(self._people.identity.next_id, PERSON_NUMBER_MAX + 1)
         return known
 
     def learn_numbers(self, record: ServiceRecord) -> None:
@@ -79,7 +79,7 @@ class AreaAgreement:
         if not self.is_other(record) or len(record.next_numbers) != len(self._next_numbers):
             return
         self._next_numbers = [max(each) for each in zip(self._next_numbers, record.next_numbers, strict=True)]
-        self._people.identity.reserve_below(record.next_numbers[self._share.share])
+        self._people.identity.reserve_below(record.next_numbers[self._settings.shard])
 
     def receive(self, record: ServiceRecord) -> None:
         """Keep a record of another area until this service is at its pulse."""
@@ -114,7 +114,7 @@ class AreaAgreement:
         if not isinstance(area, ShardingByArea):
             return 0
         others = [record for record in live if self.is_other(record)]
-        of = self._share.of
+        of = self._settings.of
         last_area_first = sorted(others, key=lambda record: record.service % of, reverse=True)
         area.set_sightings(
             {

@@ -1,6 +1,6 @@
 """Keeps the people's numbers of a site's best-view services equal, whichever of them dies or starts.
 
-Services of one share compute the same identities from the same messages. Where they differ, since a
+Services of one shard compute the same identities from the same messages. Where they differ, since a
 message was lost or late to one of them, the others follow the leading service. Which one leads follows from
 the records alone: the one that has decided every epoch for longest. When its liveliness token is gone, or no
 record came for `LEASE_S`, the next one leads. A service that was stopped, or cut off from the cameras, has a
@@ -83,12 +83,12 @@ class ServiceReplication:
         bus: BusConnection,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        share = config.view.share
-        self._index, self._services = share.index, share.services
-        self._areas = AreaAgreement(share, people, config.site.fps)
+        sharding = config.view.sharding
+        self._index, self._services = sharding.index, sharding.services
+        self._areas = AreaAgreement(sharding, people, config.site.fps)
         self._cameras, self._fps = config.camera_ids, config.site.fps
         self._interval = (
-            1 if share.areas else max(1, round(_INTERVAL_S * config.site.fps / config.window.stride))
+            1 if sharding.areas else max(1, round(_INTERVAL_S * config.site.fps / config.window.stride))
         )
         """Epochs between two records; those whose number it divides have one, in every service."""
         self._people, self._state_replication, self._bus, self._clock = people, state_replication, bus, clock

@@ -58,7 +58,7 @@ class RuleEngine:
     def __init__(self, config: Config, letterboxes: Mapping[str, Letterbox]) -> None:
         self._letterboxes = letterboxes
         self._overhead = config.overhead
-        self._has_area = bool(config.view.share.areas)
+        self._has_area = bool(config.view.sharding.areas)
         self.apply(config)
 
     def apply(self, config: Config) -> None:

@@ -35,7 +35,7 @@ def site_of_areas(folder: Path) -> Path:
         site={"fps": 10, "width": 320, "height": 180},
         sync={"start_timeout_s": 60},
         track={"joint": True},
-        share={"of": 2, "areas": areas},
+        sharding={"of": 2, "areas": areas},
         cameras=[{"id": f"c{camera}", "source": WALK.format(camera=camera)} for camera in range(2)],
     )
 

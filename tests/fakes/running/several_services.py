@@ -31,12 +31,12 @@ def configuration(
     folder: Path,
     services: int = 2,
     hosts: Sequence[str] = (),
-    share: dict[str, Any] | None = None,
+    sharding: dict[str, Any] | None = None,
     **sections: Any,
 ) -> Path:
     """Write the configuration of a site of simulated cameras; services listen on ports of `hosts`.
 
-    `share` and `sections` are merged into it, or replace its lists.
+    `sharding` and `sections` are merged into it, or replace its lists.
     """
     hosts = hosts or ["127.0.0.1"] * services
     routers = [f"tcp/{host}:{free_port()}" for host in hosts]
@@ -45,7 +45,9 @@ def configuration(
         "sync": {"port": free_port(), "start_timeout_s": 3.0},
         "zenoh": {"connect": routers, "listen": routers[0]},
         "track": {"joint": False},  # simulated cameras send tracks alone
-        "view": {"share": {"servers": [f"http://{host}:{free_port()}/" for host in hosts], **(share or {})}},
+        "view": {
+            "sharding": {"servers": [f"http://{host}:{free_port()}/" for host in hosts], **(sharding or {})}
+        },
         "cameras": [
             {"id": name, "source": f"rtsp://{name}/", "ground": ground.tolist()}
             for name, ground in zip(HALL.ids, HALL.grounds, strict=True)
@@ -84,7 +86,7 @@ class SeveralServices:
 
     @property
     def urls(self) -> list[str]:
-        return list(self.content["view"]["share"]["servers"])
+        return list(self.content["view"]["sharding"]["servers"])
 
     async def start(self, name: str) -> None:
         """Start a process."""
@@ -100,7 +102,7 @@ class SeveralServices:
             address, port = self.urls[index].strip("/").rpartition("/")[2].split(":")
             words[1] = "bestview"
             environment |= {
-                "MYVIEW_VIEW__SHARE__INDEX": match[1],
+                "MYVIEW_VIEW__SHARDING__INDEX": match[1],
                 "MYVIEW_ZENOH__LISTEN": self.content["zenoh"]["connect"][index],
                 "MYVIEW_HTTP__HOST": address,
                 "MYVIEW_HTTP__PORT": port,

@@ -354,9 +354,9 @@ def test_areas_proposes_a_setting_that_the_site_accepts(run: RunCommand, tmp_pat
     result = run("areas", site(tmp_path, cameras=cameras), "--of", 2)
     assert result.code == 0, result.err
     proposed = yaml.safe_load(result.out)
-    assert [area["margin"] for area in proposed["view"]["share"]["areas"]] == [5.0, 5.0]
+    assert [area["margin"] for area in proposed["view"]["sharding"]["areas"]] == [5.0, 5.0]
     config = load_config(site(tmp_path, cameras=cameras, **proposed))
-    assert sorted({camera for area in config.view.share.areas for camera in area.cameras}) == [
+    assert sorted({camera for area in config.view.sharding.areas for camera in area.cameras}) == [
         "c0",
         "c1",
         "c2",

@@ -58,7 +58,7 @@ def test_a_client_needs_only_its_own_line(tmp_path: Path) -> None:
 
 
 def test_every_service_of_a_site_needs_a_line(tmp_path: Path) -> None:
-    config = load_config(site(tmp_path, view={"share": {"of": 3}}))
+    config = load_config(site(tmp_path, view={"sharding": {"of": 3}}))
     assert pulse_clients(config) == ("c0", "bestview", "bestview-1", "bestview-2")
     with pytest.raises(UserError, match="has no line for bestview-1, bestview-2: pulses would wait"):
         pulse_users(config)

@@ -21,7 +21,7 @@ YARD = {"connect": "tcp/yard:7447", "url": "http://yard:8080"}
         ({"sites": {"index": 1}}, "index is 1, but of 1 sites the last is 0"),
         ({"sites": {"link": {"yard": YARD}}}, "but with those of link there are 2 sites"),
         ({"sites": {"of": 2, "link": {"hall": YARD}}}, "sites.link: 'hall' is this site; name the others"),
-        ({"sites": {"of": 4}, "view": {"share": {"of": 2}}}, "have a common divisor"),
+        ({"sites": {"of": 4}, "view": {"sharding": {"of": 2}}}, "have a common divisor"),
         ({"sites": {"of": 2, "link": {"yard": {**YARD, "url": "yard"}}}}, "sites.link.yard.url"),
         ({"sites": {"of": 2, "link": {"yard": {**YARD, "connect": "yard"}}}}, "sites.link.yard.connect"),
         ({"sites": {"of": 2, "link": {"my yard": YARD}}}, "sites.link"),

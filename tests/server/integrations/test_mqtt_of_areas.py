@@ -38,9 +38,9 @@ class TwoServices:
     def __init__(self, *ports: int) -> None:
         self.pipelines: list[LongService] = []
         for index, port in enumerate(ports):
-            share = {"of": 2, "index": index, "areas": AREAS}
+            sharding = {"of": 2, "index": index, "areas": AREAS}
             mqtt = {"host": "127.0.0.1", "port": port, "pictures_every_s": 0}
-            config = small_config(view={"share": share}, mqtt=mqtt, zones=ZONES, rules=RULES)
+            config = small_config(view={"sharding": sharding}, mqtt=mqtt, zones=ZONES, rules=RULES)
             pipeline = LongService(config.of_service())
             pipeline.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
             pipeline.connect_cameras(*CAMERAS)

@@ -320,9 +320,9 @@ async def test_a_client_stays_when_somebody_walks_into_another_area(
     areas = [{"cameras": ["c0"], "also": ["c1"]}, {"cameras": ["c1"], "also": ["c0"]}]
     async with serve_with_tokens(tmp_path) as east, live(east):
         servers = ["http://127.0.0.1:1/", f"http://127.0.0.1:{east.port}/"]
-        share = {"of": 2, "areas": areas, "servers": servers}
+        sharding = {"of": 2, "areas": areas, "servers": servers}
         async with (
-            serve_with_tokens(tmp_path, view={"share": share}) as west,
+            serve_with_tokens(tmp_path, view={"sharding": sharding}) as west,
             live(west),
             run_gateway(west.port) as gateway,
             watching(gateway.url("/objects/1", token_of("desk"))) as frames,
@@ -344,11 +344,11 @@ async def test_a_client_stays_when_somebody_walks_into_another_area(
 
 
 async def test_services_that_redirect_to_each_other_are_unavailable(tmp_path: Path) -> None:
-    async with serve_with_tokens(tmp_path, view={"share": {"of": 2, "index": 1}}) as served:
-        share = served.service.config.view.share.model_copy(
+    async with serve_with_tokens(tmp_path, view={"sharding": {"of": 2, "index": 1}}) as served:
+        sharding = served.service.config.view.sharding.model_copy(
             update={"servers": [f"http://127.0.0.1:{served.port}/"] * 2}
         )
-        view = served.service.config.view.model_copy(update={"share": share})
+        view = served.service.config.view.model_copy(update={"sharding": sharding})
         served.service.config = served.service.config.model_copy(update={"view": view})
         async with run_gateway(served.port) as gateway:
             assert (await gateway.describe("/objects/2", basic("any", token_of("desk"))))[0] == 503

@@ -84,7 +84,7 @@ def test_the_operators_page_shows_no_other_secrets(password: str) -> None:
         zenoh = {"connect": f"tls/bus:7447#key={secret}"}
         record = {"folder": f"smb://me:{secret}@nas/kept"}
         return written(
-            built(cameras=cameras, zenoh=zenoh, record=record, view={"share": {"servers": servers}})
+            built(cameras=cameras, zenoh=zenoh, record=record, view={"sharding": {"servers": servers}})
         )
 
     assert not leaks(errors_of(password), password, without=errors_of(HARMLESS))
@@ -111,7 +111,7 @@ def misplaced(address: str, secret: str) -> list[dict[str, Any]]:
         {address: None, "cameras": [camera]},
         {"cameras": [camera], "zenoh": {"connect": address}},
         {"cameras": [camera], "zenoh": {"listen": f"tls/bus#key={secret}"}},
-        {"cameras": [camera], "view": {"share": {"servers": [f"{address} "]}}},
+        {"cameras": [camera], "view": {"sharding": {"servers": [f"{address} "]}}},
     ]
 
 

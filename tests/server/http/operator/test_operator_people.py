@@ -125,7 +125,7 @@ async def test_an_invalid_edit_is_refused_with_one_line(
 
 
 async def test_people_cannot_be_edited_on_a_sharded_site() -> None:
-    async with aclosing(serve_site(view={"share": {"of": 2}})) as sites:
+    async with aclosing(serve_site(view={"sharding": {"of": 2}})) as sites:
         served = await anext(sites)
         status, response = await post_edit(served, object=1, name="Ann")
         assert status == 409

@@ -174,7 +174,7 @@ async def test_only_operators_see_or_change_zones(path: Path, tmp_path: Path) ->
     [
         (False, TEXT, {}, NO_FILE),
         (True, "cameras: [\n", {}, "is not valid YAML"),
-        (True, TEXT, {"view": {"share": {"of": 2}}}, "several services (view.share)"),
+        (True, TEXT, {"view": {"sharding": {"of": 2}}}, "several services (view.sharding)"),
     ],
 )
 async def test_where_zones_cannot_be_changed_those_in_force_are_shown_with_the_reason(

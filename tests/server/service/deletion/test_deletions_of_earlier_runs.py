@@ -60,8 +60,8 @@ def service_after(folder: Path, *deletions: Deletion) -> RunningService:
     """Return a service that records in a folder with these deletions of earlier runs."""
     folder.mkdir()
     (folder / JOURNAL_FILE).write_bytes(msgspec.json.encode(deletions))
-    share = {"index": 0, "servers": [f"http://127.0.0.1:{port}/" for port in (1, 2)]}
-    return RunningService(record={"folder": str(folder)}, view={"share": share})
+    sharding = {"index": 0, "servers": [f"http://127.0.0.1:{port}/" for port in (1, 2)]}
+    return RunningService(record={"folder": str(folder)}, view={"sharding": sharding})
 
 
 @contextlib.asynccontextmanager

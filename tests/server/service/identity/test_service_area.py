@@ -14,7 +14,7 @@ import pytest
 
 from fakes.service.scripted_cameras import CAMERAS, SMALL, FedService, camera_tracks, epoch_of, small_config
 from fakes.timeouts import PATIENCE
-from server.config.sections import HttpSettings, ShareSettings
+from server.config.sections import HttpSettings, ShardingSettings
 from server.config.site_config import Config
 from server.http.api.responses import objects_info
 from server.http.app import make_app, serving
@@ -32,9 +32,9 @@ GROUND = np.eye(3)
 """Pixels of the picture are the floor's unit."""
 
 
-def share(index: int, *, floor: bool = True) -> ShareSettings:
+def sharding(index: int, *, floor: bool = True) -> ShardingSettings:
     """Return two areas, in the west and in the east; c0 looks at the west, and both cameras see both."""
-    return ShareSettings.model_validate(
+    return ShardingSettings.model_validate(
         {
             "of": 2,
             "index": index,
@@ -59,7 +59,7 @@ def seen(camera: str, epoch: int, *places: float) -> CameraTracks:
 
 
 def test_people_beyond_the_margin_are_not_taken_in() -> None:
-    area = ServiceArea(share(0), dict.fromkeys(CAMERAS, GROUND), SIZE)
+    area = ServiceArea(sharding(0), dict.fromkeys(CAMERAS, GROUND), SIZE)
     found = FrameObservations(
         pulse=0,
         boxes=pack_detections(np.array([at(50), at(119), at(300)]), np.array([0.5, 0.6, 0.7])),
@@ -74,7 +74,7 @@ def test_people_beyond_the_margin_are_not_taken_in() -> None:
 
 
 def test_hidden_people_and_those_of_uncalibrated_cameras_are_taken_in() -> None:
-    area = ServiceArea(share(0), {"c0": GROUND, "c1": None}, SIZE)
+    area = ServiceArea(sharding(0), {"c0": GROUND, "c1": None}, SIZE)
     hidden = camera_tracks("c0", 0, {1: None})
     assert len(area.without_far_people(epoch_of(0, hidden)).tracks["c0"].tracks) == 1
     assert len(area.without_far_people(epoch_of(0, seen("c1", 0, 600.0))).tracks["c1"].tracks) == 1
@@ -86,8 +86,8 @@ class TwoAreas:
     def __init__(self, *, floor: bool = True) -> None:
         self.areas = [
             ShardingByArea(
-                share(index, floor=floor),
-                ServiceArea(share(index, floor=floor), dict.fromkeys(CAMERAS, GROUND), SIZE),
+                sharding(index, floor=floor),
+                ServiceArea(sharding(index, floor=floor), dict.fromkeys(CAMERAS, GROUND), SIZE),
                 25.0,
             )
             for index in (0, 1)
@@ -138,7 +138,7 @@ def test_without_floors_who_is_seen_by_a_camera_of_each_area_ends_in_one() -> No
 
 
 def test_nobody_leaves_an_area_before_another_has_them() -> None:
-    area = ShardingByArea(share(0), ServiceArea(share(0), dict.fromkeys(CAMERAS, GROUND), SIZE), 25.0)
+    area = ShardingByArea(sharding(0), ServiceArea(sharding(0), dict.fromkeys(CAMERAS, GROUND), SIZE), 25.0)
     area.update([TracksOfPeople(seen("c0", 0, 50.0), [3])], 0)
     area.update([TracksOfPeople(seen("c0", 0, 110.0), [3])], 500)
     assert area.own([3], {}) == [3]
@@ -151,13 +151,13 @@ def test_nobody_leaves_an_area_before_another_has_them() -> None:
 def config_of_areas(index: int, **more: Any) -> Config:
     """Return the configuration of one of two services, each of which takes in one camera."""
     areas = [{"cameras": ["c0"]}, {"cameras": ["c1"]}]
-    return small_config(view={"share": {"of": 2, "index": index, "areas": areas, **more}})
+    return small_config(view={"sharding": {"of": 2, "index": index, "areas": areas, **more}})
 
 
 def test_a_service_takes_in_the_cameras_zones_and_rules_of_its_area() -> None:
     square = [[0, 0], [9, 0], [9, 9]]
     content = {
-        "view": {"share": {"of": 2, "areas": [{"cameras": ["c0"]}, {"cameras": ["c1"]}]}},
+        "view": {"sharding": {"of": 2, "areas": [{"cameras": ["c0"]}, {"cameras": ["c1"]}]}},
         "zones": [
             {"id": "here", "camera": "c0", "area": square},
             {"id": "there", "camera": "c1", "area": square},
@@ -177,7 +177,7 @@ def test_a_service_takes_in_the_cameras_zones_and_rules_of_its_area() -> None:
 @pytest.mark.parametrize(
     ("of", "areas", "reason"),
     [
-        (2, [{"cameras": ["c0", "c1"]}], "areas: has 1, but there are 2 shares"),
+        (2, [{"cameras": ["c0", "c1"]}], "areas: has 1, but there are 2 shards"),
         (2, [{"cameras": ["c0"]}, {"cameras": ["c0"]}], "areas: camera c0 is in two"),
         (1, [{"cameras": ["c0"]}], "camera c1 is in none"),
         (2, [{"cameras": ["c0"]}, {"cameras": ["c1", "c9"]}], "there is no camera 'c9'; there are c0, c1"),
@@ -191,14 +191,14 @@ def test_a_service_takes_in_the_cameras_zones_and_rules_of_its_area() -> None:
 )
 def test_areas_that_do_not_fit_are_refused(of: int, areas: list[dict[str, Any]], reason: str) -> None:
     with pytest.raises(UserError, match=reason):
-        small_config(view={"share": {"of": of, "areas": areas}})
+        small_config(view={"sharding": {"of": of, "areas": areas}})
 
 
 def test_a_rule_about_cameras_that_no_area_has_together_is_refused() -> None:
     areas = [{"cameras": ["c0"]}, {"cameras": ["c1"]}]
     rule = {"id": "door", "kind": "entered", "cameras": ["c0", "c1"]}
     with pytest.raises(UserError, match="rules: door: no area has all of its cameras"):
-        small_config(view={"share": {"of": 2, "areas": areas}}, rules=[rule])
+        small_config(view={"sharding": {"of": 2, "areas": areas}}, rules=[rule])
 
 
 @pytest.fixture

@@ -28,7 +28,7 @@ from fakes.service.scripted_cameras import (
 )
 from fakes.timeouts import PATIENCE
 from server.cli.generated_config import free_port
-from server.config.sections import HttpSettings, ShareSettings
+from server.config.sections import HttpSettings, ShardingSettings
 from server.http.app import make_app, serving
 from server.messaging.bus import Bus
 from server.messaging.messages import Box, ZenohKeys
@@ -40,7 +40,7 @@ from server.system.errors import UserError
 
 
 def shard_settings(index: int, of: int = 2, **more: Any) -> dict[str, Any]:
-    return {"view": {"share": {"of": of, "index": index, **more}}}
+    return {"view": {"sharding": {"of": of, "index": index, **more}}}
 
 
 @settings(max_examples=20, deadline=None)
@@ -74,7 +74,7 @@ def test_shards_together_decide_as_a_single_service(of: int, seed: int) -> None:
 
 
 def test_viewers_of_a_merged_number_stay_at_their_service() -> None:
-    people = ShardingByNumber(ShareSettings(of=3, index=2))
+    people = ShardingByNumber(ShardingSettings(of=3, index=2))
     assert people.own([1, 2, 4, 5], {}) == [2, 5]
     assert people.own([1, 4], {5: 4}) == [4]
     assert people.own([1, 2], {8: 7}) == [2]
@@ -115,25 +115,25 @@ def test_a_merged_numbers_stream_continues_at_its_own_service() -> None:
 
 
 @pytest.mark.parametrize(
-    ("share", "reason"),
+    ("sharding", "reason"),
     [
         ({"of": 2, "index": 2}, "index is 2, but of 2 services the last is 1"),
-        ({"of": 2, "servers": ["http://a/"]}, "servers names 1, but there are 2 shares"),
+        ({"of": 2, "servers": ["http://a/"]}, "servers names 1, but there are 2 shards"),
         ({"of": 1, "servers": ["nowhere"]}, "servers.0: is not an address"),
-        ({"of": 0}, "view.share.of"),
+        ({"of": 0}, "view.sharding.of"),
     ],
 )
-def test_an_invalid_share_is_refused_in_one_line(share: dict[str, Any], reason: str) -> None:
-    with pytest.raises(UserError, match="share") as refusal:
-        small_config(view={"share": share})
+def test_an_invalid_division_is_refused_in_one_line(sharding: dict[str, Any], reason: str) -> None:
+    with pytest.raises(UserError, match="sharding") as refusal:
+        small_config(view={"sharding": sharding})
     assert reason in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
 
 def test_shard_addresses_are_normalized_to_base_urls() -> None:
-    share = ShareSettings(of=2, servers=["http://a:1", "https://b/myview/"])
-    assert (shard_address(0, share), shard_address(1, share)) == ("http://a:1/", "https://b/myview/")
-    assert shard_address(1, ShareSettings(of=2)) is None
+    sharding = ShardingSettings(of=2, servers=["http://a:1", "https://b/myview/"])
+    assert (shard_address(0, sharding), shard_address(1, sharding)) == ("http://a:1/", "https://b/myview/")
+    assert shard_address(1, ShardingSettings(of=2)) is None
 
 
 @pytest.fixture(params=[["http://one:1/", "http://two/x"], []])

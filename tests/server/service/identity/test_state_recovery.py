@@ -315,14 +315,14 @@ def test_names_set_or_removed_meanwhile_are_not_overwritten_by_recovery() -> Non
 
 
 def test_a_service_that_does_not_lead_sends_no_snapshots_and_all_services_recover() -> None:
-    site = Site(view={"share": {"of": 2, "index": 1}})
+    site = Site(view={"sharding": {"of": 2, "index": 1}})
     sent = dict(site.cameras)
     site.start().state_replication._sends = lambda: False
     site.track_epochs(range(6))
     assert site.service.decider.people.known
     assert {camera: retained._snapshot for camera, retained in sent.items()} == dict.fromkeys(CAMERAS, b"")
     first = tracked_site()
-    first._changes = {"view": {"share": {"of": 2, "index": 1}}}
+    first._changes = {"view": {"sharding": {"of": 2, "index": 1}}}
     ann = first.person_of(A, 2, 5)
     first.start()
     first.track_epochs(range(7, 9))

@@ -78,7 +78,7 @@ class TestAgreement:
     def service(self) -> Iterator[FedService]:
         """The service of the first of two areas, which c1 sees as well."""
         areas = [{"cameras": ["c0"], "also": ["c1"]}, {"cameras": ["c1"]}]
-        service = FedService(small_config(view={"share": {"of": 2, "areas": areas}}).of_service())
+        service = FedService(small_config(view={"sharding": {"of": 2, "areas": areas}}).of_service())
         service.decider.people._registry = TrackNumbers()  # type: ignore[assignment]
         service.connect_cameras("c0", "c1")
         for epoch in range(4):
@@ -88,7 +88,7 @@ class TestAgreement:
 
     def test_a_number_that_somebody_else_has_here_is_not_taken(self, service: FedService) -> None:
         people = service.decider.people
-        agreement = AreaAgreement(service.config.view.share, people, 25.0)
+        agreement = AreaAgreement(service.config.view.sharding, people, 25.0)
         for pulse in range(20, 60, 5):
             there = self.record(1, pulse, {2: 1}, {1: 0})
             agreement.receive(there)
@@ -97,7 +97,7 @@ class TestAgreement:
 
     def test_the_names_of_people_in_another_area_are_taken_over(self, service: FedService) -> None:
         people = service.decider.people
-        agreement = AreaAgreement(service.config.view.share, people, 25.0)
+        agreement = AreaAgreement(service.config.view.sharding, people, 25.0)
         there = self.record(1, 20, {1: 1, 2: 2, 3: 77}, {1: 0, 77: 0})
         named = [
             msgspec.structs.replace(person, name=f"Ann {person.number}")
@@ -109,7 +109,7 @@ class TestAgreement:
 
     def test_whom_another_area_has_lost_is_not_visible_there(self, service: FedService) -> None:
         people = service.decider.people
-        agreement = AreaAgreement(service.config.view.share, people, 25.0)
+        agreement = AreaAgreement(service.config.view.sharding, people, 25.0)
         for pulse, is_visible in [(20, True), (45, True), (46, False), (9000, False)]:
             there = self.record(1, pulse, {}, {77: 0})
             stays = {77: AreaStay(first_seen=0, here=20)}
@@ -121,14 +121,14 @@ class TestAgreement:
     def test_somebody_in_three_areas_is_reported_by_the_first(self, area: int) -> None:
         cameras = [{"id": name, "source": "scene:room"} for name in ("c0", "c1", "c2")]
         areas = [{"cameras": ["c0"]}, {"cameras": ["c1"]}, {"cameras": ["c2"]}]
-        share = {"of": 3, "index": area, "areas": areas}
-        service = FedService(small_config(cameras=cameras, view={"share": share}).of_service())
+        sharding = {"of": 3, "index": area, "areas": areas}
+        service = FedService(small_config(cameras=cameras, view={"sharding": sharding}).of_service())
         people = service.decider.people
         people._registry = TrackNumbers()  # type: ignore[assignment]
         service.connect_cameras(f"c{area}")
         for epoch in range(4):
             service.feed(epoch, {f"c{area}": {1: SMALL}})
-        agreement = AreaAgreement(service.config.view.share, people, 25.0)
+        agreement = AreaAgreement(service.config.view.sharding, people, 25.0)
         others = [self.record(other, 20, {1: 1}, {1: 0}) for other in range(3) if other != area]
         for live in (others, others[::-1]):
             agreement.step({}, live)
@@ -141,7 +141,7 @@ class TestAgreement:
         people = service.decider.people
         reserved: list[int] = []
         monkeypatch.setattr(people.identity, "reserve_below", reserved.append)
-        agreement = AreaAgreement(service.config.view.share, people, 25.0)
+        agreement = AreaAgreement(service.config.view.sharding, people, 25.0)
         agreement.receive(self.record(1, 20, {}, {}))
         assert agreement.next_numbers[1] == 31
         assert reserved == [600]

@@ -83,8 +83,8 @@ class Services:
 
     def start(self, index: int, *, takes_over_from: int | None = None) -> FedService:
         """Start a service."""
-        share = {"index": index, "servers": [f"http://127.0.0.1:{port}/" for port in (1, 2)]}
-        service = FedService(small_config(view={"share": share, "identity": IDENTITY}))
+        sharding = {"index": index, "servers": [f"http://127.0.0.1:{port}/" for port in (1, 2)]}
+        service = FedService(small_config(view={"sharding": sharding, "identity": IDENTITY}))
         replication = service.replication
         replication._bus = NetworkEnd(self.network, index)  # type: ignore[assignment]
         replication._clock = lambda: self.now

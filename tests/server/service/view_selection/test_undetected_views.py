@@ -174,7 +174,7 @@ def test_shards_select_views_as_a_single_service(
     moments = [boxes_at(moment) for moment in story]
     single = decide(decider(), moments)
     for index in range(2):
-        part = decide(decider(share={"of": 2, "index": index}), moments)
+        part = decide(decider(sharding={"of": 2, "index": index}), moments)
         for expected, actual in zip(single, part, strict=True):
             choices = [choice for choice in expected.choices if choice.number % 2 == index]
             assert list(actual.choices) == choices
