@@ -8,8 +8,9 @@ evaluate --views`, compared with the exact offline optimum of the true visibilit
 The ground truth replaces MyView's stages one after the other; the difference of two rows is the loss of a
 stage: *true boxes* of visible people; *own boxes, true ids*: MyView's tracked boxes with the id of the person
 in each, also with short gaps interpolated; *own tracklets, true ids*: each tracklet with the id of its most
-frequent person; *own tracks, true ids*: likewise for whole tracks; *final ids*: MyView's final ids, known
-from the start, with every person always present. The mean of *own tracks, not associated* is the score of the
+frequent person; *own tracks, true ids*: likewise for whole tracks; *true ids by floor*: MyView's boxes with
+true ids that only cameras of one calibrated floor share; *final ids*: MyView's final ids, known from the
+start, with every person always present. The mean of *own tracks, not associated* is the score of the
 single-camera trackers.
 
 Detectors prescan recordings, as MyView does; with `--as-live` they learn the background on the fly.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -105,6 +105,17 @@ def by_nearest_feet(rows: Rows, ground: Mapping[str, Floats]) -> dict[str, list[
 def boxes_by_truth(rows: Rows, gt: Rows) -> dict[str, list[MotRow]]:
     """Return each box with the id of the person in it; false positives are dropped."""
     return {camera: oracle_association(found, gt[camera]) for camera, found in rows.items()}
+
+
+def apart_by_floor(rows: Rows, one_floor: Collection[str]) -> dict[str, list[MotRow]]:
+    """Return the rows with ids that the cameras of one floor share, and no other cameras."""
+    floors = {camera: "" if camera in one_floor else camera for camera in rows}
+    by_floor = {(floors[camera], row.id) for camera, found in rows.items() for row in found}
+    number = {key: index for index, key in enumerate(sorted(by_floor), start=1)}
+    return {
+        camera: [replace(row, id=number[floors[camera], row.id]) for row in found]
+        for camera, found in rows.items()
+    }
 
 
 def tracks_by_truth(rows: Rows, gt: Rows, least_iou: float = 0.5) -> dict[str, list[MotRow]]:

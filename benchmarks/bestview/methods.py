@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.bestview.association_baselines import (
+    apart_by_floor,
     boxes_by_truth,
     by_nearest_feet,
     interpolated_gaps,
@@ -176,6 +177,9 @@ def _calibrated(
     messages = track_scene(jointly, found.frames)
     result = decide(jointly, messages)
     yield MethodResult(name, result)
+    if jointly.joint_cameras and set(jointly.joint_cameras) != set(scene.gt):
+        by_floor = apart_by_floor(boxes_by_truth(result.tracks, scene.gt), jointly.joint_cameras)
+        yield MethodResult("  true ids by floor", selection.best(by_floor))
     yield MethodResult(f"{name}, detected only", decide(scene.config(view=DETECTED_ONLY), messages))
     without_peers = track_scene(selection.scene.config(ground=False), found.frames)
     yield MethodResult(f"{name}, per camera", decide(per_camera, track_scene(per_camera, found.frames)))

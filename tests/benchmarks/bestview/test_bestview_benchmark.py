@@ -12,6 +12,7 @@ import pytest
 
 from benchmarks.bestview import __main__ as bestview
 from benchmarks.bestview.association_baselines import (
+    apart_by_floor,
     boxes_by_truth,
     by_nearest_feet,
     interpolated_gaps,
@@ -120,6 +121,15 @@ def test_the_truth_may_name_boxes_or_whole_tracks() -> None:
     ]
     assert {row.id for row in tracks_by_truth(swapped, gt)["c0"]} == {7}
     assert len(tracks_by_truth(swapped, gt)["c0"]) == 10
+
+
+def test_only_cameras_of_one_floor_share_ids() -> None:
+    everywhere = {camera: rows(7, 0.0, range(1, 4)) for camera in ("c0", "c1", "c2", "c3")}
+    apart = apart_by_floor(everywhere, ("c0", "c2"))
+    ids = {camera: {row.id for row in found} for camera, found in apart.items()}
+    assert ids["c0"] == ids["c2"]
+    assert len(set.union(*ids.values())) == 3
+    assert [row.left for row in apart["c3"]] == [0.0] * 3
 
 
 def test_moments_of_hiding_are_bridged_and_absences_are_not() -> None:
