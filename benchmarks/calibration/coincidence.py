@@ -20,7 +20,7 @@ import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, product
+from itertools import combinations, pairwise, product
 from pathlib import Path
 
 import numpy as np
@@ -170,7 +170,7 @@ def pairs_of_rooms(people: int, seeds: Sequence[int], seconds: float) -> Iterato
     floors = [draw_floor("room", _ROOM_CAMERAS, people, seed, seconds) for seed in seeds]
     for floor in floors:
         yield from pairs_of_one_floor(f"room, {people} walking: one floor", floor)
-    for floor, other in zip(floors, [*floors[1:], floors[0]], strict=True):
+    for other, floor in pairwise([*floors, *floors[:1]] if len(floors) > 1 else floors):
         for pair in product(floor.walks, other.walks):
             yield WalkedPair(f"room, {people} walking: another floor", pair, None, floor.fps)
 
@@ -301,7 +301,9 @@ def measure(options: argparse.Namespace, report: Report) -> None:
 def main() -> None:
     """Run the benchmark."""
     options = parser(__doc__, "calibration.coincidence")
-    options.add_argument("--rooms", type=int, default=2, help="drawn rooms of each kind")
+    options.add_argument(
+        "--rooms", type=int, default=2, help="drawn rooms of each kind, two for pairs between them"
+    )
     options.add_argument("--seconds", type=float, default=60.0, help="length of the walk in a drawn room")
     options.add_argument(
         "--shift", type=float, default=3.0, help="seconds by which cameras may be out of sync"
