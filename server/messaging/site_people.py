@@ -62,8 +62,8 @@ class PersonHistogram(msgspec.Struct, frozen=True, kw_only=True):
             raise ValueError("there is no histogram")
 
 
-class Population(msgspec.Struct, frozen=True, kw_only=True):
-    """The mean color histogram of all people of a site: how its cameras render them."""
+class ReferenceHistogram(msgspec.Struct, frozen=True, kw_only=True):
+    """The mean color histogram of all people of a site, by which a person's is equalized."""
 
     tracks: Annotated[float, msgspec.Meta(ge=0, le=1e12)]
     histogram: Annotated[bytes, msgspec.Meta(max_length=HISTOGRAM_BINS_MAX * 4)]
@@ -125,7 +125,7 @@ class SitePeople(msgspec.Struct, frozen=True, kw_only=True):
     histograms: Annotated[list[PersonHistogram], msgspec.Meta(max_length=HISTOGRAMS_MAX)] = msgspec.field(
         name="looks", default_factory=list
     )
-    population: Population | None = None
+    reference_histogram: ReferenceHistogram | None = msgspec.field(name="population", default=None)
     deletions: Annotated[list[SiteDeletion], msgspec.Meta(max_length=DELETIONS_MAX)] = []
     viewers: Viewers | None = None
     """Null: as before."""
@@ -186,13 +186,13 @@ def unpack_sightings(message: SitePeople) -> list[SightingRow]:
     ]
 
 
-def pack_population(histogram_sum: NDArray[np.float64]) -> Population:
+def pack_reference_histogram(histogram_sum: NDArray[np.float64]) -> ReferenceHistogram:
     """Pack the sum of all tracks' normalized histograms (B,)."""
     tracks = float(histogram_sum.sum())
     shares = histogram_sum / tracks if tracks > 0 else histogram_sum
-    return Population(tracks=tracks, histogram=np.clip(shares, 0.0, 1.0).astype("<f4").tobytes())
+    return ReferenceHistogram(tracks=tracks, histogram=np.clip(shares, 0.0, 1.0).astype("<f4").tobytes())
 
 
-def unpack_population(population: Population) -> NDArray[np.float64]:
+def unpack_reference_histogram(reference: ReferenceHistogram) -> NDArray[np.float64]:
     """Return the sum of the tracks' histograms (B,)."""
-    return np.frombuffer(population.histogram, "<f4").astype(np.float64) * population.tracks
+    return np.frombuffer(reference.histogram, "<f4").astype(np.float64) * reference.tracks

@@ -24,7 +24,7 @@ from server.messaging.site_people import (
     SitePeople,
     TokenDigest,
     Viewers,
-    pack_population,
+    pack_reference_histogram,
     pack_sightings,
 )
 from server.service.bus_connection import BusConnection
@@ -78,7 +78,9 @@ class OtherSitesMessages(ScriptTarget):
                 PersonHistogram(number=number, frames=25, histogram=pack_histograms(histogram))
                 for number, histogram in zip(numbers, histograms, strict=True)
             ],
-            population=pack_population(histograms.sum(axis=0) if numbers else np.zeros(_BINS)),
+            reference_histogram=pack_reference_histogram(
+                histograms.sum(axis=0) if numbers else np.zeros(_BINS)
+            ),
             deletions=[
                 SiteDeletion(index=index, numbered_since=1.0, numbers=[index + 1], deletes_media=False)
             ]

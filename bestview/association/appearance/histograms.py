@@ -93,8 +93,8 @@ class HistogramEqualizer:
         prior = np.full(bins, _PRIOR_TRACKS / bins)
         return equalized_by(prior + self._sums.get((camera, bins), 0.0), histograms)
 
-    def population(self, bins: int) -> NDArray[np.float64]:
-        """Return the sum of the normalized (B,) histograms of all tracks, of all cameras."""
+    def reference_histogram(self, bins: int) -> NDArray[np.float64]:
+        """Return how all cameras render people: the sum of all tracks' normalized histograms, (B,)."""
         sums = [total for (_, size), total in self._sums.items() if size == bins]
         return np.asarray(np.sum([np.zeros(bins), *sums], axis=0))
 

@@ -227,17 +227,17 @@ class IdentityRegistry:
         self._people.restore(people)
 
     def add_site_sightings(
-        self, sightings: Iterable[SiteSighting], populations: Mapping[str, NDArray[np.float64]]
+        self, sightings: Iterable[SiteSighting], reference_histograms: Mapping[str, NDArray[np.float64]]
     ) -> None:
         """Add people whom other sites see or have seen: who arrives here can be one who has left there.
 
-        `populations` are what `population` returns at these sites, by their names.
+        `reference_histograms` are what `reference_histogram` returns at these sites, by their names.
         """
-        self._people.add_site_sightings(sightings, populations)
+        self._people.add_site_sightings(sightings, reference_histograms)
 
-    def population(self, bins: int) -> NDArray[np.float64]:
+    def reference_histogram(self, bins: int) -> NDArray[np.float64]:
         """Return the sum of the (B,) histograms of all tracks: how this site's cameras render people."""
-        return self._cross_camera.equalizer.population(bins)
+        return self._cross_camera.equalizer.reference_histogram(bins)
 
     def mean_histograms(self, people: Iterable[int]) -> dict[int, MeanHistogram]:
         """Return these people's mean histograms over this site's cameras, by id, as far as known."""

@@ -103,14 +103,14 @@ def sum_over_cameras(appearances: Iterable[PersonAppearance]) -> MeanHistogram |
 
 
 @dataclass(slots=True)
-class SitePopulations:
+class ReferenceHistograms:
     """How other sites render people: (B,) sums of normalized histograms, by site and number of bins."""
 
     by_site: dict[tuple[str, int], Floats] = field(default_factory=dict)
 
-    def put(self, site: str, population: Floats) -> None:
+    def put(self, site: str, histogram: Floats) -> None:
         """Replace that of a site."""
-        self.by_site[site, population.size] = population
+        self.by_site[site, histogram.size] = histogram
 
     def distances(
         self,
@@ -131,14 +131,14 @@ class SitePopulations:
         total, count = np.zeros((len(new), len(old))), np.zeros((len(new), len(old)))
         own = [sum_over_cameras([appearance]) for appearance in new]
         for (site, bins), indices in _by_site(old).items():
-            theirs, here = self.by_site.get((site, bins), np.zeros(bins)), equalizer.population(bins)
+            theirs, here = self.by_site.get((site, bins), np.zeros(bins)), equalizer.reference_histogram(bins)
             weight = min(float(theirs.sum()), float(here.sum()))
             rows = [i for i, mean in enumerate(own) if mean and mean.histogram_sum.size == bins]
             if not rows:
                 continue
             columns = list(indices)
-            curves = equalized_by(_reference(here, weight), _means(own[i] for i in rows))
-            others = equalized_by(_reference(theirs, weight), _means(indices.values()))
+            curves = equalized_by(_with_prior(here, weight), _means(own[i] for i in rows))
+            others = equalized_by(_with_prior(theirs, weight), _means(indices.values()))
             places = np.ix_(rows, columns)
             total[places] += cdf_distance(curves[:, None], others[None])
             count[places] += 1.0
@@ -156,10 +156,10 @@ def _by_site(
     return found
 
 
-def _reference(population: Floats, weight: float) -> Floats:
+def _with_prior(reference: Floats, weight: float) -> Floats:
     """Return what histograms are equalized by: a site's people, who weigh so many tracks, and the prior."""
-    share = weight / float(population.sum()) if weight else 0.0
-    return np.asarray(_PRIOR_TRACKS / population.size + share * population)
+    share = weight / float(reference.sum()) if weight else 0.0
+    return np.asarray(_PRIOR_TRACKS / reference.size + share * reference)
 
 
 def _means(histograms: Iterable[MeanHistogram | None]) -> Floats:

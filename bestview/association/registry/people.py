@@ -173,11 +173,11 @@ class PersonStore:
         self._by_id.setdefault(person_id, Person(person_id, frame))
 
     def add_site_sightings(
-        self, sightings: Iterable[SiteSighting], populations: Mapping[str, NDArray[np.float64]]
+        self, sightings: Iterable[SiteSighting], reference_histograms: Mapping[str, NDArray[np.float64]]
     ) -> None:
         """Add what other sites know about people, and how they render them, by site."""
-        for site, population in populations.items():
-            self._reidentifier.populations.put(site, population)
+        for site, histogram in reference_histograms.items():
+            self._reidentifier.reference_histograms.put(site, histogram)
         for sighting in sightings:
             unknown = Person(sighting.person_id, departed=True, elsewhere=True)
             self._by_id.setdefault(sighting.person_id, unknown).add_site_sighting(sighting)

@@ -19,7 +19,7 @@ from bestview.association.appearance.histograms import (
     PersonAppearance,
     cdf_distance,
 )
-from bestview.association.registry.other_sites import SitePopulations
+from bestview.association.registry.other_sites import ReferenceHistograms
 from bestview.association.registry.person import Person
 from bestview.association.settings import ResolvedIdentitySettings
 from bestview.association.tracklet_clusters import TrackletCluster
@@ -63,7 +63,7 @@ class Reidentifier:
         self._travel = TravelTimeModel(settings, cameras)
         self._covisible_cameras: set[tuple[str, str]] = set()
         """Pairs of cameras that have seen one person at the same time."""
-        self.populations = SitePopulations()
+        self.reference_histograms = ReferenceHistograms()
 
     def learn_covisible_cameras(self, clusters: Iterable[TrackletCluster], frame: int) -> None:
         """Learn from clusters which cameras see the same people simultaneously: their views overlap."""
@@ -100,7 +100,9 @@ class Reidentifier:
         time = self._travel.evidence(arrivals, departures)
         distances = appearance_distances(cross_camera.equalizer, *appearances)
         site_histograms = [lost_person.person.site_histograms for lost_person in lost]
-        between_sites = self.populations.distances(cross_camera.equalizer, appearances[0], site_histograms)
+        between_sites = self.reference_histograms.distances(
+            cross_camera.equalizer, appearances[0], site_histograms
+        )
         distances = np.where(np.isnan(distances), between_sites, distances)
         gate = cross_camera.same_person_gate
         by_appearance = match_by_appearance(distances, possible, gate)

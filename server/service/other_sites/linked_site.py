@@ -10,7 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from server.config.sections import LinkSettings
-from server.messaging.site_people import DIGEST_BYTES, SitePeople, TokenDigest, Viewers, unpack_population
+from server.messaging.site_people import (
+    DIGEST_BYTES,
+    SitePeople,
+    TokenDigest,
+    Viewers,
+    unpack_reference_histogram,
+)
 
 HEARD_S = 5.0
 """Seconds after its last message for which a site counts as there."""
@@ -35,7 +41,7 @@ class LinkedSite:
     refused: str = ""
     """Why its messages are not used; empty: they are."""
     viewers: Viewers = field(default_factory=Viewers)
-    population: NDArray[np.float64] | None = None
+    reference_histogram: NDArray[np.float64] | None = None
     _begins_anew: int = 0
     """Messages in a row in which its numbers began at another time."""
 
@@ -64,11 +70,11 @@ class LinkedSite:
         return any(token.digest == digest and token.object in {0, number} for token in self.viewers.tokens)
 
 
-def population_of(message: SitePeople) -> NDArray[np.float64] | None:
+def reference_histogram_of(message: SitePeople) -> NDArray[np.float64] | None:
     """Return how a site's cameras render people; None: the message does not say."""
-    if message.population is None or not message.population.histogram:
+    if message.reference_histogram is None or not message.reference_histogram.histogram:
         return None
-    return unpack_population(message.population)
+    return unpack_reference_histogram(message.reference_histogram)
 
 
 def token_digest(salt: bytes, token_sha256: str) -> bytes:

@@ -19,7 +19,7 @@ from server.messaging.site_people import (
     SiteDeletion,
     SitePeople,
     Viewers,
-    pack_population,
+    pack_reference_histogram,
     pack_sightings,
 )
 from server.service.identity.person_tracker import PersonTracker
@@ -88,7 +88,7 @@ class SiteMessageBuilder:
         sightings = [self._sighting(person, pulse) for person in self._next_people(found)]
         cameras = sorted({sighting.camera for sighting in sightings})
         histograms = self._next_histograms(found) if self._sites.share_looks else []
-        population = self._people.identity.population(self._bins) if histograms else None
+        reference = self._people.identity.reference_histogram(self._bins) if histograms else None
         is_due = viewers != self._viewers or self._count % _VIEWERS_EVERY == 1
         self._viewers = viewers
         return msgspec.msgpack.encode(
@@ -99,7 +99,7 @@ class SiteMessageBuilder:
                 cameras=cameras,
                 people=pack_sightings(sightings, cameras),
                 histograms=histograms,
-                population=None if population is None else pack_population(population),
+                reference_histogram=None if reference is None else pack_reference_histogram(reference),
                 deletions=self._next_deletions(deletions),
                 viewers=viewers if is_due else None,
             )

@@ -31,7 +31,7 @@ from server.service.identity.state_recovery import SINGLE_CAMERA_NUMBER_MAX
 from server.service.identity.state_replication import StateReplication
 from server.service.other_sites.deletions import SiteDeletions
 from server.service.other_sites.last_sightings import LastSighting, LastSightings
-from server.service.other_sites.linked_site import SILENT_S, LinkedSite, population_of
+from server.service.other_sites.linked_site import SILENT_S, LinkedSite, reference_histogram_of
 from server.service.other_sites.number_conflicts import NumberConflicts
 from server.service.other_sites.numbering_ledger import NumberingLedger
 from server.service.other_sites.people_here import PeopleHere
@@ -200,8 +200,8 @@ class OtherSites:
         return not reason
 
     def _add_people(self, site: LinkedSite, report: SitePeople, pulse: int, now: float) -> None:
-        if site.population is None or report.population is not None:
-            site.population = population_of(report)
+        if site.reference_histogram is None or report.reference_histogram is not None:
+            site.reference_histogram = reference_histogram_of(report)
         gone = self._state_replication.deleted(self._state_replication.numbers_since)
         newest = [
             sighting
@@ -222,8 +222,8 @@ class OtherSites:
             self.last_sightings.by_number[number].for_registry(histogram)
             for number, histogram in histograms.items()
         ]
-        populations = {} if site.population is None else {site.name: site.population}
-        self._people.identity.add_site_sightings(sightings, populations)
+        references = {} if site.reference_histogram is None else {site.name: site.reference_histogram}
+        self._people.identity.add_site_sightings(sightings, references)
 
     def _forget_numbers_of(self, index: int) -> None:
         """Forget people of a site whose numbers have begun anew, but who is here: it will not use theirs."""

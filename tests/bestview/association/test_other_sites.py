@@ -24,7 +24,7 @@ from bestview.association.appearance.histograms import (
     MeanHistogram,
     PersonAppearance,
 )
-from bestview.association.registry.other_sites import SitePopulations
+from bestview.association.registry.other_sites import ReferenceHistograms
 from fakes.bestview.identity_scenes import (
     BLIND,
     STRIDE,
@@ -78,7 +78,7 @@ class Site:
             )
             for person in own
         ]
-        other.registry.add_site_sightings(sightings, {self.name: self.registry.population(BINS)})
+        other.registry.add_site_sightings(sightings, {self.name: self.registry.reference_histogram(BINS)})
 
 
 def walk_between(
@@ -157,7 +157,7 @@ def test_a_site_that_does_not_tell_looks_gives_nobody_their_number() -> None:
 def test_a_site_that_renders_everybody_brighter_is_equalized_once_both_have_seen_many() -> None:
     crowd, brighter = np.linspace(1.0, 5.0, 200), 1.0
     walker = MeanHistogram.of(coat(3.2 + brighter), 25)
-    here, hall = HistogramEqualizer(), SitePopulations()
+    here, hall = HistogramEqualizer(), ReferenceHistograms()
     new, old = PersonAppearance({"c0": walker}), {"hall": MeanHistogram.of(coat(3.2), 25)}
     before = hall.distances(here, [new], [old])[0, 0]
     for which in crowd:

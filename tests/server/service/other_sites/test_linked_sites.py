@@ -96,7 +96,7 @@ async def test_a_site_can_keep_looks_to_itself() -> None:
         assert sites.elsewhere("yard") == {1: "hall"}
         sites.walk(4, yard={A: SMALL})
         assert sites.number("yard", A) == 2
-        assert not any(message.histograms or message.population for _, message in sites.told)
+        assert not any(message.histograms or message.reference_histogram for _, message in sites.told)
 
 
 async def test_who_is_at_two_sites_gets_a_new_number_where_they_arrived_later(sites: LinkedSites) -> None:
