@@ -78,7 +78,11 @@ class ShardingSettings(Section):
     @property
     def shard(self) -> int:
         """The shard of this service."""
-        return self.index % self.of
+        return self.shard_of_service(self.index)
+
+    def shard_of_service(self, index: int) -> int:
+        """Return the shard of a service, by its index."""
+        return index % self.of
 
     @property
     def is_first(self) -> bool:

@@ -226,10 +226,10 @@ def replacement_addresses(sharding: ShardingSettings) -> list[str]:
     return [
         server.rstrip("/") + "/"
         for index, server in enumerate(sharding.servers)
-        if index != sharding.index and index % sharding.of == sharding.shard
+        if index != sharding.index and sharding.shard_of_service(index) == sharding.shard
     ]
 
 
-def shard_address(number: int, sharding: ShardingSettings) -> str | None:
+def shard_address(shard: int, sharding: ShardingSettings) -> str | None:
     """Return the address of the first service of a shard; None where the configuration has none."""
-    return sharding.servers[number].rstrip("/") + "/" if sharding.servers else None
+    return sharding.servers[shard].rstrip("/") + "/" if sharding.servers else None

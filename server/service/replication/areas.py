@@ -53,7 +53,7 @@ class AreaAgreement:
 
     def is_other(self, record: ServiceRecord) -> bool:
         """Return whether a record is of a service of another area."""
-        return bool(self._settings.areas) and record.service % self._settings.of != self._settings.shard
+        return bool(self._settings.areas) and self._shard_of(record) != self._settings.shard
 
     def present(self) -> dict[int, AreaStay]:
         """Return since when each person in the area has been known, by number, and was there."""
@@ -114,11 +114,12 @@ class AreaAgreement:
         if not isinstance(area, ShardingByArea):
             return 0
         others = [record for record in live if self.is_other(record)]
-        of = self._settings.of
-        last_area_first = sorted(others, key=lambda record: record.service % of, reverse=True)
+        last_area_first = sorted(others, key=self._shard_of, reverse=True)
         area.set_sightings(
             {
-                number: AreaSighting(record.service % of, stay.here, record.pulse - stay.here <= self._unseen)
+                number: AreaSighting(
+                    self._shard_of(record), stay.here, record.pulse - stay.here <= self._unseen
+                )
                 for record in last_area_first
                 for number, stay in record.in_area.items()
             }
@@ -131,6 +132,9 @@ class AreaAgreement:
             self._waiting[record.service] = {pulse: each for pulse, each in waiting.items() if pulse > newest}
         numbers = {pulse: numbers_of_tracks(own[pulse].cameras) for pulse in {each.pulse for each in due}}
         return sum(self._follow(numbers[each.pulse], own[each.pulse].in_area, each) for each in due)
+
+    def _shard_of(self, record: ServiceRecord) -> int:
+        return self._settings.shard_of_service(record.service)
 
     def _follow(
         self, own: Mapping[TrackName, int], in_area: Mapping[int, AreaStay], other: ServiceRecord
