@@ -80,6 +80,16 @@ class ServiceRecord(msgspec.Struct, frozen=True, kw_only=True):
         """The service with the lowest leads."""
         return self.unbroken_since, self.service
 
+    @property
+    def numbered_since(self) -> float:
+        """When its numbers began, unix seconds; 0: it has none."""
+        return max((snapshot.numbered_since for snapshot in self.cameras.values()), default=0.0)
+
+    @property
+    def next_number(self) -> int:
+        """The first number that it has not assigned."""
+        return max((snapshot.next_number for snapshot in self.cameras.values()), default=1)
+
 
 class CameraHistogram(msgspec.Struct, frozen=True, kw_only=True):
     """A person's color histograms in one camera."""

@@ -41,6 +41,13 @@ class MeanHistogram:
             return cls(np.zeros_like(histogram), 0)
         return cls(histogram * (frames / total), frames)
 
+    def added_to(self, known: MeanHistogram | None) -> MeanHistogram:
+        """Return the mean over the frames of both; one of other bins is replaced: they cannot be compared."""
+        if known is None or known.histogram_sum.size != self.histogram_sum.size:
+            return self
+        total = known.histogram_sum + self.histogram_sum
+        return MeanHistogram(total, known.frame_count + self.frame_count)
+
     @property
     def mean(self) -> Floats:
         """(B,), summing to 1."""
@@ -54,15 +61,9 @@ class PersonAppearance:
     by_camera: dict[str, MeanHistogram] = field(default_factory=dict)
 
     def add(self, camera: str, histogram: MeanHistogram) -> None:
-        """Add a histogram. Another number of bins replaces the old one: the two cannot be compared."""
-        if not histogram.frame_count:
-            return
-        known = self.by_camera.get(camera)
-        if known is not None and known.histogram_sum.size == histogram.histogram_sum.size:
-            histogram = MeanHistogram(
-                known.histogram_sum + histogram.histogram_sum, known.frame_count + histogram.frame_count
-            )
-        self.by_camera[camera] = histogram
+        """Add a histogram."""
+        if histogram.frame_count:
+            self.by_camera[camera] = histogram.added_to(self.by_camera.get(camera))
 
     def add_all(self, other: PersonAppearance) -> None:
         """Add all histograms of another appearance."""

@@ -76,12 +76,6 @@ class PeopleHere:
         histograms: dict[int, MeanHistogram] = {}
         for person in found:
             for each in person.ids:
-                if each not in by_id:
-                    continue
-                known, more = histograms.get(person.number), by_id[each]
-                if known is None or known.histogram_sum.size != more.histogram_sum.size:
-                    histograms[person.number] = more
-                else:
-                    total = known.histogram_sum + more.histogram_sum
-                    histograms[person.number] = MeanHistogram(total, known.frame_count + more.frame_count)
+                if each in by_id:
+                    histograms[person.number] = by_id[each].added_to(histograms.get(person.number))
         return histograms

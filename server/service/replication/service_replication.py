@@ -146,8 +146,7 @@ class ServiceReplication:
 
     def restore(self, state: ServiceState) -> None:
         """Take over a state, before the first epoch."""
-        since = max((snapshot.numbered_since for snapshot in state.record.cameras.values()), default=0.0)
-        gone = self._state_replication.deleted(since)
+        gone = self._state_replication.deleted(state.record.numbered_since)
         kept = [person for person in state.people if gone.isdisjoint([person.number, *person.aliases])]
         restore_people(self._people, msgspec.structs.replace(state, people=kept))
         self._state_replication.take_over(state.record.cameras)
@@ -234,7 +233,7 @@ class ServiceReplication:
 
         Between areas it is the earliest: none assigns a number that another one remembers.
         """
-        since = max((snapshot.numbered_since for snapshot in record.cameras.values()), default=0.0)
+        since = record.numbered_since
         is_later = since >= self._state_replication.numbers_since and self._areas.is_other(record)
         if since > 0.0 and not is_later:
             self._state_replication.follow_numbering(since)
@@ -254,7 +253,7 @@ class ServiceReplication:
 
     def _reserve(self, own: ServiceRecord, other: ServiceRecord) -> None:
         """Skip the numbers that another service has assigned and this one has not."""
-        ahead = _next_number(other) - _next_number(own)
+        ahead = other.next_number - own.next_number
         if 0 < ahead <= _NUMBERS_AHEAD_MAX:
             self._people.identity.reserve_below(self._people.identity.next_id + ahead)
 
@@ -322,7 +321,3 @@ class ServiceReplication:
 
 def _deleted_numbers(deletion: DeletedPerson) -> set[tuple[float, int, bool]]:
     return {(deletion.numbers_since, number, deletion.deletes_media) for number in deletion.numbers}
-
-
-def _next_number(record: ServiceRecord) -> int:
-    return max((snapshot.next_number for snapshot in record.cameras.values()), default=1)
