@@ -71,6 +71,8 @@ class Camera(msgspec.Struct, frozen=True):
     """Windows of tracks that came too late to be used."""
     fps: float
     message: str
+    retry_at: float | None = None
+    """When its source, which cannot be used, is opened again, unix seconds."""
     condition: str = "clear"
     """What is wrong with the picture: covered, turned, blurred, noisy or frozen."""
     condition_since: float | None = None

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import msgspec
+
+_TIME_MAX = 4102444800.0
+"""Unix seconds of the year 2100."""
 
 
 class CameraNow(msgspec.Struct, frozen=True):
@@ -26,6 +31,8 @@ class CameraNow(msgspec.Struct, frozen=True):
     """Share of the windows with a proven optimum, 0 to 1, since the service began."""
     waiting: int | None = None
     """Frames that wait for detection."""
+    retry_at: Annotated[float, msgspec.Meta(ge=0.0, le=_TIME_MAX)] | None = None
+    """When its source, which cannot be used, is opened again, unix seconds."""
 
 
 class PersonNow(msgspec.Struct, frozen=True):

@@ -96,6 +96,7 @@ def _measured(camera: CameraNow, metrics: Metrics | None) -> CameraNow:
             "myview_camera_optimal_windows_total", "myview_camera_windows_total", camera=name
         ),
         waiting=None if waiting is None else int(waiting),
+        retry_at=camera.retry_at,
     )
 
 

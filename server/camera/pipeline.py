@@ -32,7 +32,7 @@ from server.camera.view_monitor import ViewMonitor
 from server.config.sections import CameraSettings
 from server.config.site_config import Config
 from server.media.letterbox import Letterbox
-from server.messaging.camera_status import PictureMotion
+from server.messaging.camera_status import PictureMotion, RetryPause
 from server.messaging.messages import CameraTracks, FrameDetections
 from server.messaging.operator_messages import CORRECTIONS_MAX
 from server.messaging.packed_arrays import pack_boxes
@@ -184,6 +184,11 @@ class CameraPipeline:
     def away(self) -> bool:
         """Whether a live camera delivers no frames; passthrough may have to wait for a GOP to begin."""
         return not self.source.recorded and self._missing > (self._away_after if self.is_passthrough else 0)
+
+    @property
+    def absence(self) -> RetryPause | None:
+        """Why a live camera delivers no frames, and when it is connected again; None: that is not known."""
+        return self.source.absence if self.away and isinstance(self.source, LiveStream) else None
 
     def encode(self, pulse: int, frame: CapturedFrame) -> AccessUnit:
         """Encode the frame of a pulse, which was the last one taken."""

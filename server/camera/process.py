@@ -287,9 +287,11 @@ class CameraProcess:
         if self._knocks.update(motion):
             self._moved_since = self._clock()
         status = self._meter.status(self._id, self._boot, self._state, len(self._backlog), self._load)
+        absence = self._pipeline.absence
         self._publisher.publish_status(
             msgspec.structs.replace(
                 status,
+                unavailable=absence.message() if absence else None,
                 condition=condition,
                 condition_since=self._conditions.since,
                 covered_share=covered_share,

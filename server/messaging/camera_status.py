@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import msgspec
@@ -73,8 +75,8 @@ REASON_MAX = 1000
 """Characters of a reason, at most."""
 
 
-RetryCause = Literal["unopened", "changed"]
-"""Why a camera's source is opened again: it could not be, or what it sends has changed."""
+RetryCause = Literal["unopened", "changed", "lost"]
+"""Why a source is opened again: it could not be, what it sends has changed, or it has stopped sending."""
 
 
 class UnavailableCamera(msgspec.Struct, frozen=True, kw_only=True):
@@ -85,6 +87,29 @@ class UnavailableCamera(msgspec.Struct, frozen=True, kw_only=True):
     cause: RetryCause = "unopened"
     retry_s: Duration = 0.0
     """Seconds until it is opened again."""
+    address: Annotated[str, msgspec.Meta(max_length=REASON_MAX)] = ""
+    """Protocol and host of the source, for operators; empty: unknown, or the reason may name it."""
+
+
+@dataclass(frozen=True, slots=True)
+class RetryPause:
+    """Why a source cannot be used, and until when its camera waits before it opens it again."""
+
+    reason: str
+    cause: RetryCause
+    until: float
+    """On the monotonic clock."""
+    address: str = ""
+    """As in UnavailableCamera."""
+
+    def message(self) -> UnavailableCamera:
+        """Return the message that tells services what is left of the pause."""
+        return UnavailableCamera(
+            reason=" ".join(self.reason.split())[:REASON_MAX],
+            cause=self.cause,
+            retry_s=max(0.0, self.until - time.monotonic()),
+            address=self.address[:REASON_MAX],
+        )
 
 
 class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
@@ -94,6 +119,8 @@ class CameraStatus(msgspec.Struct, frozen=True, kw_only=True):
     boot: Number
     state: CameraState
     pulse: Annotated[int, msgspec.Meta(ge=-1, le=PULSE_MAX)]
+    unavailable: UnavailableCamera | None = None
+    """Why its source is away, and when it is connected again; null: it is there, or nothing is known yet."""
     fps: Duration
     """Frames captured in about the last second."""
     missed: Number

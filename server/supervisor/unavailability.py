@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 
 import msgspec
 
 from server.config.site_config import Config
 from server.messaging.bus import Bus
-from server.messaging.camera_status import REASON_MAX, RetryCause, UnavailableCamera
+from server.messaging.camera_status import RetryCause, RetryPause
 from server.messaging.messages import ZenohKeys
-
-
-@dataclass(frozen=True, slots=True)
-class _Pause:
-    reason: str
-    cause: RetryCause
-    until: float
-    """On the monotonic clock."""
 
 
 class UnavailabilityReport:
@@ -31,7 +22,7 @@ class UnavailabilityReport:
         self._id = camera_id
         self._bus: Bus | None = None
         self._key = ""
-        self._pause = _Pause("", "unopened", 0.0)
+        self._pause = RetryPause("", "unopened", 0.0)
 
     def send(self, config: Config, reason: str, cause: RetryCause, retry_s: float) -> None:
         """Send why the camera cannot be used, and that it is opened again in so many seconds.
@@ -39,8 +30,8 @@ class UnavailabilityReport:
         Raises:
             UserError: the bus's address is not supported.
         """
-        line = " ".join(reason.removeprefix(f"camera {self._id}: ").split())[:REASON_MAX]
-        self._pause = _Pause(line, cause, time.monotonic() + retry_s)
+        reason = reason.removeprefix(f"camera {self._id}: ")
+        self._pause = RetryPause(reason, cause, time.monotonic() + retry_s)
         if self._bus is None:
             keys = ZenohKeys(config.site.name)
             self._key = keys.camera(self._id, "unavailable")
@@ -61,8 +52,4 @@ class UnavailabilityReport:
 
     def _publish(self) -> None:
         if self._bus is not None:
-            pause = self._pause
-            message = UnavailableCamera(
-                reason=pause.reason, cause=pause.cause, retry_s=max(0.0, pause.until - time.monotonic())
-            )
-            self._bus.publish(self._key, msgspec.msgpack.encode(message))
+            self._bus.publish(self._key, msgspec.msgpack.encode(self._pause.message()))

@@ -1,6 +1,7 @@
 /** A tile for each camera with a current still and its diagnostics, and the clients of the pulse server. */
 
 import { requestOperator } from '../shared/requests.js';
+import { formatCameraProblem, formatMoment } from '../shared/camera_problem.js';
 import { element, make, setText } from '../shared/dom.js';
 import { Repeater } from './section.js';
 import { CameraStills } from './camera_stills.js';
@@ -111,22 +112,15 @@ class CameraTile {
 function formatState({ state, retry_at: retryAt, condition, condition_since: since, covered_share: covered }) {
   if (retryAt !== null) return 'Waiting';
   const wrong = state === 'live' ? CONDITIONS[condition] : undefined;
-  if (wrong) return since ? `${wrong} since ${formatTime(since)}` : wrong;
+  if (wrong) return since ? `${wrong} since ${formatMoment(since)}` : wrong;
   if (state === 'live' && covered > 0) return `${Math.round(100 * covered)} % covered`;
   return STATES[state] ?? state;
 }
 
 /** @param {CameraDiagnostics} camera */
-function formatProblem({ message, retry_at: retryAt, last_error: last }) {
-  if (message) return retryAt === null ? message : `Will be opened again at ${formatTime(retryAt)}: ${message}`;
-  return last ? `Last error, ${formatTime(last.at)}: ${last.text}` : '';
-}
-
-/** @param {number} seconds unix */
-function formatTime(seconds) {
-  const at = new Date(seconds * 1000);
-  const day = at.toDateString() === new Date().toDateString() ? '' : `${at.toLocaleDateString()} `;
-  return `${day}${at.toLocaleTimeString()}`;
+function formatProblem(camera) {
+  const last = camera.last_error;
+  return formatCameraProblem(camera) || (last ? `Last error, ${formatMoment(last.at)}: ${last.text}` : '');
 }
 
 /** @param {Spread | null} spread */

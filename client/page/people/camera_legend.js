@@ -1,5 +1,6 @@
 /** The site's cameras: their colors, which one is displayed, held or preferred, and their states. */
 
+import { formatCameraProblem } from '../shared/camera_problem.js';
 import { make } from '../shared/dom.js';
 
 /** @import {Camera} from '../shared/api_types.js' */
@@ -33,11 +34,12 @@ export class CameraLegend {
 
   /** @param {Camera[]} cameras */
   show(cameras) {
-    for (const { camera, state, message } of cameras) {
+    for (const each of cameras) {
+      const { camera, state, message } = each;
       const item = this.#items.get(camera);
       if (!item) continue;
       item.classList.toggle('away', state !== 'live');
-      item.title = message;
+      item.title = formatCameraProblem(each);
       const [summary] = message.split(':'); // the title has the details
       /** @type {HTMLElement} */ (item.lastElementChild).textContent = state === 'live' ? summary : state;
     }

@@ -59,6 +59,7 @@
  * @property {number} late
  * @property {number} fps
  * @property {string} message
+ * @property {number | null} retry_at unix seconds until which it waits to open its source again; null: it does not wait
  * @property {'clear' | 'covered' | 'turned' | 'blurred' | 'noisy' | 'frozen'} condition what is wrong with the picture
  * @property {number | null} condition_since unix seconds; null: nothing is wrong
  * @property {number} covered_share of the picture, by something on the lens

@@ -19,7 +19,6 @@ from server.camera.sources.opening import OpenedVideo, open_video
 from server.camera.sources.orientation import INTERLACED, Orientation, parse_orientation, pixel_aspect
 from server.camera.sources.stream_clock import CaptureTime
 from server.camera.sources.stream_reader import OPEN_S, READ_S, StreamChangedError, StreamReader
-from server.system.address_redaction import redact_to_host
 from server.system.errors import UnavailableError
 
 log = logging.getLogger(__name__)
@@ -88,7 +87,7 @@ class LiveStream(StreamReader):
 
     def _check_fit(self) -> None:
         if misfit := self._misfit:
-            raise UnavailableError(f"{redact_to_host(self._url)}: {misfit}")
+            raise UnavailableError(f"{self._name}: {misfit}")
 
     def _size_message(self, size: tuple[int, int]) -> str:
         return "its images are {}x{} now, they were {}x{}".format(*size, *self.size)
@@ -131,7 +130,7 @@ class LiveStream(StreamReader):
             self._orientation = self._oriented(first)
             self.size = self._size_of(first)
         if first.interlaced_frame:
-            log.warning("%s: %s", redact_to_host(self._url), INTERLACED)
+            log.warning("%s: %s", self._name, INTERLACED)
         self._sized.set()
 
     def _oriented(self, picture: VideoFrame) -> Orientation:

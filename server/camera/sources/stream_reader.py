@@ -6,6 +6,7 @@ import logging
 import threading
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import cast
 
 import av
@@ -16,6 +17,7 @@ from expbackoff import Backoff
 from logthrottle import LogThrottle
 from server.camera.sources.opening import OpenedVideo, open_video, timeout_message
 from server.camera.sources.stream_clock import StreamClock
+from server.messaging.camera_status import RetryPause
 from server.system.address_redaction import ffmpeg_reason, redact_to_host
 from server.system.errors import UserError
 
@@ -40,6 +42,9 @@ class StreamReader:
 
     def __init__(self, url: str, options: Mapping[str, str]) -> None:
         self._url, self._options = url, options
+        self._name = redact_to_host(url)
+        self.absence: RetryPause | None = None
+        """Why no frames arrive, and when it connects again; None: they arrive, or the connection is open."""
         self._clock = StreamClock()
         """Of the present connection."""
         self._closing = threading.Event()
@@ -81,7 +86,10 @@ class StreamReader:
         while not self._closing.is_set():
             if opened is not None and self._read_safely(opened):
                 backoff.reset()
-            if self._closing.wait(backoff.next()):
+            pause_s = backoff.next()
+            if self.absence is not None:
+                self.absence = replace(self.absence, until=time.monotonic() + pause_s)
+            if self._closing.wait(pause_s):
                 return
             opened = self._connect()
 
@@ -89,7 +97,7 @@ class StreamReader:
         try:
             return open_video(self._url, self._options, (OPEN_S, READ_S))
         except UserError as error:
-            self._log_away(str(error))
+            self._record_away(str(error).removeprefix(f"{self._name}: "))
             return None
 
     def _read(self, opened: OpenedVideo) -> bool:
@@ -109,7 +117,7 @@ class StreamReader:
                     self._clock.observe(video, now := time.monotonic())
                     if self._decode(video):
                         first_at, last_at = now if first_at is None else first_at, now
-                        self._log_recovered()
+                        self._record_frame()
                 else:
                     self._use_audio(cast("av.Packet[AudioStream]", packet))
         except StreamChangedError as error:
@@ -119,23 +127,26 @@ class StreamReader:
         finally:
             opened.container.close()
         if not self._closing.is_set():
-            self._log_away(f"{redact_to_host(self._url)}: {reason}")
+            self._record_away(reason)
         return first_at is not None and last_at - first_at >= _STABLE_S
 
-    def _log_away(self, reason: str, *, unexpected: bool = False) -> None:
-        """Log that the camera is away; throttled, as it may come and go."""
+    def _record_away(self, reason: str, *, unexpected: bool = False) -> None:
+        """Record that the camera is away, and log it; throttled, as it may come and go."""
+        self.absence = RetryPause(reason, "lost", time.monotonic(), self._name)
         if (more := self._away_log.record(reason)) is not None:
-            log.warning("%s%s; retrying", reason, more, exc_info=unexpected)
+            log.warning("%s: %s%s; retrying", self._name, reason, more, exc_info=unexpected)
 
-    def _log_recovered(self) -> None:
+    def _record_frame(self) -> None:
+        """Record that frames arrive."""
+        self.absence = None
         if ended := self._away_log.end():
-            log.info("%s: frames arrive again, after %.0f s", redact_to_host(self._url), ended.seconds)
+            log.info("%s: frames arrive again, after %.0f s", self._name, ended.seconds)
 
     def _read_safely(self, opened: OpenedVideo) -> bool:
         """Read, and log unexpected errors: the thread must survive them."""
         try:
             return self._read(opened)
         except Exception as error:  # noqa: BLE001 — logged with its traceback
-            self._log_away(f"{redact_to_host(self._url)}: unexpected {type(error).__name__}", unexpected=True)
+            self._record_away(f"unexpected {type(error).__name__}", unexpected=True)
             opened.container.close()
             return False

@@ -48,12 +48,11 @@ def render_status(now: SiteNow, rates: ServiceRates, notice: str = "") -> Render
 
 
 def _head(now: SiteNow) -> Text:
-    at = datetime.fromtimestamp(now.now, UTC).strftime("%H:%M:%S UTC")
     pulse = "no pulse" if now.pulse is None else f"pulse {now.pulse}"
     ready = (f"ready: {printable(now.why)}", "green")
     if not now.ready:
         ready = (f"not ready: {printable(now.why)}", "red")
-    return Text.assemble((printable(now.name), "bold"), f"  {at}  {pulse}  ", ready)
+    return Text.assemble((printable(now.name), "bold"), f"  {_utc(now.now)}  {pulse}  ", ready)
 
 
 def _service(service: ServiceNow, rates: ServiceRates) -> Text:
@@ -93,9 +92,12 @@ def _cameras(cameras: tuple[CameraNow, ...]) -> RenderableType:
             "-" if camera.optimal is None else f"{100 * camera.optimal:.0f} %",
         )
         unsynchronized = "" if camera.synchronized or camera.state != "live" else "not synchronized"
+        problem = camera.message
+        if problem and camera.retry_at is not None:
+            problem += f"; it is opened again at {_utc(camera.retry_at)}"
         notices += [
             Text(printable(f"{camera.camera}: {text}"), style="yellow")
-            for text in (camera.message, unsynchronized)
+            for text in (problem, unsynchronized)
             if text
         ]
     return Group(table, *notices)
@@ -112,6 +114,10 @@ def _people(people: tuple[PersonNow, ...]) -> RenderableType:
         cells = [escape(printable(text)) for text in (label, person.camera or "-", since, seen_by)]
         table.add_row(*cells, style="" if person.visible else "dim")
     return table
+
+
+def _utc(unix_s: float) -> str:
+    return datetime.fromtimestamp(unix_s, UTC).strftime("%H:%M:%S UTC")
 
 
 def _ms(seconds: float | None) -> str:

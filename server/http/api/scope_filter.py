@@ -49,12 +49,12 @@ def filter_objects(objects: Objects, scope: Scope, resolve: Resolve) -> Objects:
 
 
 def filter_cameras(cameras: Cameras, scope: Scope) -> Cameras:
-    """Keep only the camera of the scope; for one person keep all cameras, without their error messages."""
+    """Keep only the camera of the scope; for one person keep all cameras, without their problems."""
     if scope.is_all:
         return cameras
     if scope.camera is not None:
         return Cameras([info for info in cameras.cameras if info.camera == scope.camera])
-    return Cameras([msgspec.structs.replace(info, message="") for info in cameras.cameras])
+    return Cameras([msgspec.structs.replace(info, message="", retry_at=None) for info in cameras.cameras])
 
 
 def filter_choices(choices: GopChoices, scope: Scope, resolve: Resolve) -> GopChoices:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import msgspec
 import numpy as np
 
@@ -32,7 +34,14 @@ class CameraInfo(msgspec.Struct, frozen=True):
     """Load-shedding level; 0: none."""
     synchronized: bool
     """Pulses come from the server; otherwise the camera counts by itself."""
-    message: str
+    message: Annotated[str, msgspec.Meta(description="A problem; empty: none.")]
+    retry_at: Annotated[
+        float | None,
+        msgspec.Meta(
+            description="When its source, which is lost or unusable, is opened again, unix seconds; null: "
+            "now, or it is open."
+        ),
+    ]
     condition: str
     """What is wrong with the picture: clear, covered, turned, blurred, noisy or frozen."""
     condition_since: float | None
@@ -68,8 +77,6 @@ class CameraDiagnostics(CameraInfo, frozen=True):
     floor_offset: float | None
     """Meters by which it disagrees with the others about where people stand, and is corrected; null: tracked
     alone."""
-    retry_at: float | None
-    """When its source, which cannot be used, is opened again, unix seconds; null: now, or it is open."""
     last_error: CameraProblem | None
     """The last problem; it stays when the camera has recovered."""
     picture: ImagePlacement | None
@@ -147,7 +154,7 @@ class CameraService:
         return Floor(cameras, [camera.id for camera in config.cameras if camera.ground is None])
 
     def _info(self, camera: str, state: CameraState) -> CameraInfo:
-        status = state.status
+        status, unavailable = state.status, state.unavailable
         return CameraInfo(
             camera=camera,
             state=state.label,
@@ -159,16 +166,17 @@ class CameraService:
             load_level=status.load_level if status else 0,
             synchronized=status.synchronized if status else False,
             message=state.message,
+            retry_at=unavailable.retry_at if unavailable and unavailable.retry_s else None,
             condition=status.condition if status else "clear",
             condition_since=(status.condition_since or None) if status else None,
             covered_share=status.covered_share if status else 0.0,
         )
 
     def _diagnostics(self, camera: str, state: CameraState) -> CameraDiagnostics:
-        status, metrics, unavailable = state.status, state.metrics, state.unavailable
+        status, metrics = state.status, state.metrics
         info = msgspec.structs.asdict(self._info(camera, state))
         return CameraDiagnostics(
-            **{**info, "message": state.message or (unavailable.reason if unavailable else "")},
+            **{**info, "message": state.operator_message},
             bad_messages=state.bad_messages,
             clock_offset=status.clock_offset if status else None,
             sync_error=metrics.sync_error,
@@ -176,7 +184,6 @@ class CameraService:
             optimal=metrics.optimal,
             solved_windows=metrics.recent_solved_windows,
             floor_offset=self._pipeline.joint.offsets.get(camera),
-            retry_at=unavailable.retry_at if unavailable and unavailable.retry_s else None,
             last_error=metrics.last_error,
             picture=None if metrics.size is None else self._placement(metrics.size),
         )

@@ -3,17 +3,30 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime
+from types import MappingProxyType
 
 from server.messaging.camera_status import (
     SUBSTREAM_AWAY,
     CameraStatus,
     RetryCause,
+    UnavailableCamera,
     motion_text,
     picture_text,
 )
 from server.service.metrics.camera_metrics import CameraMetrics
+
+_CAUSE_TEXTS: Mapping[RetryCause, str] = MappingProxyType(
+    {
+        "unopened": "its source cannot be opened",
+        "changed": "what its source sends has changed",
+        "lost": "its source delivers no frames",
+    }
+)
+_SAME_MOMENT_S = 0.5
+"""Messages about one pause take different times, which must not move its end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +38,19 @@ class Unavailability:
     cause: RetryCause
     retry_at: float
     """Unix seconds by this service's clock."""
+    message: str
+    """For any viewer: without addresses."""
+
+    @classmethod
+    def told(cls, message: UnavailableCamera, before: Unavailability | None) -> Unavailability:
+        """Take in a message that has just been received."""
+        text, retry_at = _CAUSE_TEXTS[message.cause], time.time() + message.retry_s
+        if before is not None and abs(before.retry_at - retry_at) < _SAME_MOMENT_S:
+            retry_at = before.retry_at
+        if not message.address:
+            return cls(message.reason, message.cause, retry_at, text)
+        reason = f"{message.address}: {message.reason}"
+        return cls(reason, message.cause, retry_at, f"{text}: {message.reason}")
 
     @property
     def retry_s(self) -> float:
@@ -42,7 +68,7 @@ class CameraState:
     refused: str = ""
     """Why its frames are refused; empty: they are used."""
     unavailable: Unavailability | None = None
-    """None: its process is connected, or tells nothing."""
+    """None: its source delivers frames, or its process tells nothing."""
     stream_changes: int = 0
     """How often its source was opened again because what it sends had changed."""
     status: CameraStatus | None = None
@@ -70,11 +96,13 @@ class CameraState:
 
     @property
     def message(self) -> str:
-        """A message to the operator about a problem; empty: none."""
+        """A message to viewers about a problem; empty: none."""
         if self.refused:
             return self.refused
+        if self.unavailable is not None:
+            return self.unavailable.message
         if self.alive and self.is_source_away:
-            return "its source delivers no frames; retrying"
+            return _CAUSE_TEXTS["lost"]
         if not self.alive or self.status is None:
             return ""
         texts = [SUBSTREAM_AWAY if self.status.substream == "away" else "", self.status.load]
@@ -84,6 +112,11 @@ class CameraState:
             since = datetime.fromtimestamp(self.status.motion_since).astimezone()
             texts.insert(0, f"{motion_text(self.status.motion)} since {since:%H:%M}: calibrate it again")
         return "; ".join(filter(None, texts))
+
+    @property
+    def operator_message(self) -> str:
+        """A message to the operator about a problem: it may name addresses; empty: none."""
+        return self.unavailable.reason if self.unavailable and not self.refused else self.message
 
     def count_bad_message(self, reason: Exception | str) -> None:
         """Count an invalid message."""

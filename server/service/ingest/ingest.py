@@ -125,11 +125,13 @@ class Ingest:
             if (more := self._unknown_log.record(camera)) is not None:
                 log.warning("camera %s is not in the configuration%s: ignored", camera, more)
             return
+        if is_present or state.alive:
+            state.unavailable = None
         state.alive = is_present
         state.status = None  # of an earlier connection
         state.metrics.reset_recent()
         if is_present:
-            state.refused, state.unavailable, state.ended = "", None, False
+            state.refused, state.ended = "", False
             self._aligner.camera_connected(camera)
         else:
             state.metrics.record_problem("its process disconnected")
@@ -213,11 +215,15 @@ class Ingest:
         except DECODE_ERRORS as error:
             state.count_bad_message(error)
         else:
-            was_away, before = state.is_source_away, state.status
+            before = state.status
             was_covered = before is not None and before.covered_share > 0.0
+            before_problem = state.operator_message if state.is_source_away else ""
             state.status = status
-            if state.is_source_away and not was_away:
-                state.metrics.record_problem(state.message)
+            told = status.unavailable if state.is_source_away else None
+            state.unavailable = Unavailability.told(told, state.unavailable) if told else None
+            if state.is_source_away:
+                if state.operator_message != before_problem:
+                    state.metrics.record_problem(state.operator_message)
             elif status.substream == "away" and (before is None or before.substream != "away"):
                 state.metrics.record_problem(SUBSTREAM_AWAY)
             elif status.condition not in {"clear", "clear" if before is None else before.condition}:
@@ -238,9 +244,9 @@ class Ingest:
         if state.alive:
             return  # it was late
         before = state.unavailable
-        state.unavailable = Unavailability(told.reason, told.cause, time.time() + told.retry_s)
-        if before is None or before.reason != told.reason:
-            state.metrics.record_problem(told.reason)
+        state.unavailable = Unavailability.told(told, before)
+        if before is None or before.reason != state.unavailable.reason:
+            state.metrics.record_problem(state.unavailable.reason)
             state.stream_changes += told.cause == "changed"
 
     def receive_thumbnail(self, message: Message) -> None:

@@ -1,6 +1,8 @@
-"""The viewer's page shows which cameras shed load."""
+"""The viewer's page shows which cameras shed load, and which are lost."""
 
 from __future__ import annotations
+
+import re
 
 import pytest
 from playwright.async_api import Browser, expect
@@ -28,3 +30,12 @@ async def test_the_shed_level_of_a_camera_is_shown_beside_its_name(browser: Brow
                 "title", levels[-1 if busy == 2 else 1].description
             )
             await expect(items.nth(busy)).not_to_have_class("away")
+
+
+async def test_a_lost_camera_says_why_and_when_it_is_opened_again(browser: Browser) -> None:
+    site = FakeSite(lost={CAMERAS[2]: "its source delivers no frames: Connection refused"})
+    async with visiting(browser, site) as visit:
+        item = visit.page.locator("#cameras li").nth(2)
+        await expect(item).to_contain_text("gone")
+        line = r"Will be opened again at \d.*: its source delivers no frames: Connection refused$"
+        await expect(item).to_have_attribute("title", re.compile(line))

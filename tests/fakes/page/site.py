@@ -66,6 +66,7 @@ class FakeSite:
         flags: Flags for the operator.
         pointed: The position corrections received.
         busy: Messages of cameras about shed load.
+        lost: Messages of cameras whose source is lost and is opened again in an hour.
         stays: Stays that a search of the past finds, one answer each; what is missing is filled in.
         searched: Queries of searches of the past.
         pulse0: Unix seconds at which pulse 0 was due.
@@ -92,6 +93,7 @@ class FakeSite:
     flags: list[dict[str, Any]] = field(default_factory=list)
     pointed: list[dict[str, Any]] = field(default_factory=list)
     busy: dict[str, str] = field(default_factory=dict)
+    lost: dict[str, str] = field(default_factory=dict)
     stays: list[dict[str, Any]] = field(default_factory=list)
     searched: list[dict[str, str]] = field(default_factory=list)
     pulse0: float = field(init=False)
@@ -150,7 +152,9 @@ class FakeSite:
         return {
             "cameras": [
                 {"camera": c, "pulse": self.edge, "late": 0, "fps": FPS}
-                | {"state": "live", "message": self.busy.get(c, "")}
+                | {"state": "gone" if c in self.lost else "live"}
+                | {"message": self.lost.get(c) or self.busy.get(c, "")}
+                | {"retry_at": time.time() + 3600 if c in self.lost else None}
                 for c in CAMERAS
             ]
         }

@@ -153,6 +153,11 @@ def unavailable(camera: str, cause: RetryCause, retry_s: float, reason: str) -> 
     return Message(ZenohKeys("hall").camera(camera, "unavailable"), msgspec.msgpack.encode(message), b"")
 
 
+def lost_source(reason: str, retry_s: float) -> UnavailableCamera:
+    """Return why a camera's source has stopped sending, as its status has it."""
+    return UnavailableCamera(reason=reason, cause="lost", retry_s=retry_s, address="rtsp://10.0.0.9/...")
+
+
 def thumbnail(camera: str, track: int, jpeg: bytes, pulse: int = 0, boot: int = 1) -> Message:
     """Return a thumbnail as received from the bus."""
     head = ThumbnailHeader(track=track, boot=boot, pulse=pulse)

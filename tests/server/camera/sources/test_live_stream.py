@@ -158,6 +158,29 @@ def test_a_long_absence_is_logged_once_and_so_is_the_return(
     assert not [message for message in caplog.messages if "hunter2" in message]
 
 
+def test_an_absent_camera_says_why_and_when_it_is_connected_again_without_secrets(
+    camera: MotionJpeg, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stream_reader, "_RETRY_FIRST_S", 0.05)
+    monkeypatch.setattr(stream_reader, "_RETRY_MAX_S", 60.0)
+    port = camera.plug_in()
+    source = LiveStream(f"http://me:hunter2@127.0.0.1:{port}/?p=hunter2", {})
+    try:
+        until(lambda: shown(source) == 0)
+        assert source.absence is None
+        camera.unplug()
+        until(lambda: source.absence is not None and "refused" in source.absence.reason)
+        until(lambda: source.absence is not None and source.absence.message().retry_s > 0.2)
+        assert source.absence is not None
+        message = source.absence.message()
+        camera.plug_in(port)
+        until(lambda: source.absence is None)
+    finally:
+        source.close()
+    assert (message.cause, message.address) == ("lost", f"http://127.0.0.1:{port}/...")
+    assert message.reason == "cannot open this video: Connection refused"
+
+
 @pytest.mark.parametrize(("stable_s", "delays"), [(3.0, [0.5, 1.0, 2.0, 4.0]), (0.0, [0.5] * 4)])
 def test_a_camera_that_ends_soon_again_and_again_is_connected_to_less_and_less_often(
     camera: MotionJpeg,

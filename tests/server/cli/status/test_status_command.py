@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,15 @@ from client.status.prometheus_text import Metrics, service_of
 from fakes.cli.command_line import RunCommand
 from fakes.http.tokens import serve_with_tokens, token_of
 from fakes.service.fed_site import A, B, ServedSite, show_people
-from fakes.service.scripted_cameras import CAMERAS, FPS, camera_tracks, small_config, status, tracks
+from fakes.service.scripted_cameras import (
+    CAMERAS,
+    FPS,
+    camera_tracks,
+    lost_source,
+    small_config,
+    status,
+    tracks,
+)
 from fakes.timeouts import PATIENCE
 from server.cli.status import command
 from server.cli.status.command import status_live, status_once
@@ -99,6 +108,16 @@ async def test_a_token_for_one_camera_shows_only_it_and_no_metrics(tmp_path: Pat
         ).service is not None
         with pytest.raises(UserError, match="MYVIEW_TOKEN"):
             await status_once(url(served), None, as_json=False)
+
+
+async def test_a_lost_camera_says_why_and_when_it_is_opened_again(site_with_people: ServedSite) -> None:
+    lost = lost_source("Connection refused", 3600.0)
+    site_with_people.service.ingest.receive_status(status(A, state="away", unavailable=lost))
+    output = " ".join(printed(await client.status(url(site_with_people))).split())
+    line = (
+        rf"{A}: its source delivers no frames: Connection refused; it is opened again at \d\d:\d\d:\d\d UTC"
+    )
+    assert re.search(line, output)
 
 
 async def test_no_text_of_the_server_controls_the_terminal(site_with_people: ServedSite) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from camsync import Credentials, PulseClient, PulseServer
 from fakes.service.fed_site import A, B, ServedSite, serve_site
-from fakes.service.scripted_cameras import CAMERAS, status, unavailable
+from fakes.service.scripted_cameras import CAMERAS, lost_source, status, unavailable
 from server.messaging.inbox import Message
 from server.messaging.messages import ZenohKeys
 
@@ -39,9 +39,12 @@ async def test_the_last_error_is_shown_until_the_next_one(site_with_people: Serv
     ingest.receive_status(Message(ZenohKeys("hall").camera(A, "status"), b"{}", b""))
     assert "invalid message: " in await trouble()
     ingest.receive_status(status(A, state="away"))
-    assert await trouble() == "its source delivers no frames; retrying"
+    assert await trouble() == "its source delivers no frames"
+    refused = lost_source("Connection refused", 10.0)
+    ingest.receive_status(status(A, state="away", unavailable=refused))
+    assert await trouble() == "rtsp://10.0.0.9/...: Connection refused"
     ingest.receive_status(status(A, state="live"))
-    assert await trouble() == "its source delivers no frames; retrying"
+    assert await trouble() == "rtsp://10.0.0.9/...: Connection refused"
     ingest.set_present(ZenohKeys("hall").camera(A, "alive"), is_present=False)
     assert await trouble() == "its process disconnected"
 
@@ -55,7 +58,42 @@ async def test_only_operators_see_why_a_camera_cannot_be_opened(site_with_people
         (await site_with_people.get_json(path))["cameras"][0]["message"]
         for path in ("/api/operator/cameras", "/api/cameras")
     ]
-    assert (operators, viewers) == (reason, "")
+    assert (operators, viewers) == (reason, "its source cannot be opened")
+
+
+async def test_everybody_sees_why_a_camera_is_lost_and_until_when_and_operators_where(
+    site_with_people: ServedSite,
+) -> None:
+    """The camera says it each second; that its messages travel does not move the end of the pause."""
+
+    async def shown() -> list[tuple[str, str, float | None]]:
+        answers = [
+            await site_with_people.get_json(path) for path in ("/api/cameras", "/api/operator/cameras")
+        ]
+        first = [answer["cameras"][0] for answer in answers]
+        return [(camera["state"], camera["message"], camera["retry_at"]) for camera in first]
+
+    ingest, began = site_with_people.service.ingest, time.time()
+    ingest.receive_status(status(A, state="away", unavailable=lost_source("no answer within 5 s", 9.9)))
+    (state, viewers, retry_at), (_, operators, operators_retry_at) = first = await shown()
+    assert (state, viewers) == ("gone", "its source delivers no frames: no answer within 5 s")
+    assert operators == "rtsp://10.0.0.9/...: no answer within 5 s"
+    assert retry_at == operators_retry_at
+    assert retry_at is not None
+    assert began + 9.9 <= retry_at <= time.time() + 9.9
+    ingest.receive_status(
+        status(A, state="away", unavailable=lost_source("no answer within 5 s", retry_at - time.time() + 0.1))
+    )
+    assert await shown() == first
+    async with site_with_people.session.get("/metrics") as answer:
+        assert f'myview_camera_retry_seconds{{camera="{A}",cause="lost"}} ' in await answer.text()
+    ingest.receive_status(status(A, state="away", unavailable=lost_source("no answer within 5 s", 0.0)))
+    assert [at for _, _, at in await shown()] == [None, None], "it is being connected"
+    ingest.receive_status(status(A))
+    assert await shown() == [("live", "", None)] * 2
+    ingest.receive_status(status(A, state="away", unavailable=lost_source("Connection refused", 5.0)))
+    ingest.set_present(ZenohKeys("hall").camera(A, "alive"), is_present=False)
+    assert await shown() == [("gone", "", None)] * 2, "its process, which said it, is gone"
 
 
 async def test_a_camera_that_waits_to_be_opened_again_says_until_when(site_with_people: ServedSite) -> None:

@@ -170,7 +170,11 @@ def test_why_a_camera_cannot_be_opened_is_for_operators_until_it_connects() -> N
     served.ingest.set_present(KEYS.camera("c0", "alive"), is_present=False)
     served.handle("unavailable", UNAVAILABLE)
     assert state.unavailable is not None
-    assert (state.unavailable.reason, state.unavailable.retry_s, state.message) == (REASON, 0.0, "")
+    assert (state.unavailable.retry_s, state.message, state.operator_message) == (
+        0.0,
+        "its source cannot be opened",
+        REASON,
+    )
     assert state.metrics.last_error is not None
     first = state.metrics.last_error
     assert first.text == REASON
