@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import secrets
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,6 +32,8 @@ from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
 
 _Entry = dict[str, Any]
+_DIGEST_KEY = secrets.token_bytes(32)
+"""An entry may contain a password, which a digest without a key would allow to guess."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +42,9 @@ class ConfiguredCamera:
 
     id: str
     address: str
-    substream: str = ""
+    substream: str
+    digest: str
+    """Tells whether it has changed; of this process."""
 
 
 def list_cameras(path: Path) -> Sequence[ConfiguredCamera]:
@@ -52,17 +58,25 @@ def list_cameras(path: Path) -> Sequence[ConfiguredCamera]:
             str(camera.get("id")),
             redact_to_host(str(camera.get("source"))),
             redact_to_host(str(camera.get("substream") or "")),
+            _digest(camera),
         )
         for camera in _cameras(path)
     ]
 
 
-def demands_own_video(path: Path, camera_id: str) -> bool:
+def _digest(camera: _Entry) -> str:
+    text = json.dumps(camera, sort_keys=True, default=str)
+    return hashlib.blake2b(text.encode(), key=_DIGEST_KEY, digest_size=16).hexdigest()
+
+
+def demands_own_video(path: Path, camera_id: str, digest: str | None = None) -> bool:
     """Return whether a camera of a configuration is only passed through; a new one, without an id, is not.
 
     Raises:
-        UserError: the configuration is invalid.
+        UserError: the configuration is invalid, or the camera is not what the digest is of.
     """
+    if camera_id:
+        _camera_to_change(_cameras(path), camera_id, digest)
     return any(camera.passthrough == "pass" for camera in load_config(path).cameras if camera.id == camera_id)
 
 
@@ -88,7 +102,11 @@ def add_camera(path: Path, tried: TriedCamera) -> None:
 
 
 def readdress_camera(
-    path: Path, camera_id: str, tried: TriedCamera, sizes: Mapping[str, Size] = MappingProxyType({})
+    path: Path,
+    camera_id: str,
+    tried: TriedCamera,
+    sizes: Mapping[str, Size] = MappingProxyType({}),
+    digest: str | None = None,
 ) -> str:
     """Change a camera's address and login to those of one that was tried; its other settings stay.
 
@@ -100,18 +118,17 @@ def readdress_camera(
         camera_id: the camera.
         tried: what it becomes.
         sizes: sizes of pictures by source, as far as they are known.
+        digest: of the camera that the change is based on; None: it is made whatever it is.
 
     Returns:
         what has become of settings in pixels, or what must be redone, in a line; empty: nothing.
 
     Raises:
-        UserError: there is no such camera, another one has this address, or the files would be invalid or
-            cannot be written.
+        UserError: there is no such camera, it is not what the digest is of, another one has this address, or
+            the files would be invalid or cannot be written.
     """
     cameras = _cameras(path)
-    earlier = next((camera for camera in cameras if str(camera.get("id")) == camera_id), None)
-    if earlier is None:
-        raise UserError(f"there is no camera {camera_id!a}")
+    earlier = _camera_to_change(cameras, camera_id, digest)
     if any(camera.get("source") == tried.address.source for camera in cameras if camera is not earlier):
         raise UserError(f"{tried.address.shown}: another camera of the configuration has this address")
     config = load_config(path)
@@ -151,15 +168,15 @@ def readdress_camera(
     return changed.note
 
 
-def rename_camera(path: Path, camera_id: str, name: str) -> None:
+def rename_camera(path: Path, camera_id: str, name: str, digest: str | None = None) -> None:
     """Rename a camera; its homography in the ground file is copied to the new name.
 
     Raises:
-        UserError: there is no such camera, another setting names it, the name is invalid or taken, or the
-            files cannot be written.
+        UserError: there is no such camera, it is not what the digest is of, another setting names it, the
+            name is invalid or taken, or the files cannot be written.
     """
     check_name(name)
-    cameras = _cameras_to_change(path, camera_id)
+    cameras = _cameras_to_change(path, camera_id, digest)
     if any(str(camera.get("id")) == name for camera in cameras):
         raise UserError(f"another camera is called {name}")
     renamed = [{**camera, "id": name} if str(camera.get("id")) == camera_id else camera for camera in cameras]
@@ -168,14 +185,14 @@ def rename_camera(path: Path, camera_id: str, name: str) -> None:
     replace_file(text, path)
 
 
-def remove_camera(path: Path, camera_id: str) -> None:
+def remove_camera(path: Path, camera_id: str, digest: str | None = None) -> None:
     """Remove a camera; the file of its password stays, since the earlier configuration names it.
 
     Raises:
-        UserError: there is no such camera, another setting names it, it is the last one, or the file cannot
-            be written.
+        UserError: there is no such camera, it is not what the digest is of, another setting names it, it is
+            the last one, or the file cannot be written.
     """
-    cameras = _cameras_to_change(path, camera_id)
+    cameras = _cameras_to_change(path, camera_id, digest)
     remaining = [camera for camera in cameras if str(camera.get("id")) != camera_id]
     if not remaining:
         raise UserError("a site has at least one camera: add another one first")
@@ -195,14 +212,24 @@ def _password_files(path: Path) -> set[str]:
     return {file.name for file in folder.glob("*")}
 
 
-def _cameras_to_change(path: Path, camera_id: str) -> list[_Entry]:
+def _camera_to_change(cameras: Sequence[_Entry], camera_id: str, digest: str | None) -> _Entry:
+    """Return a camera that is to be changed, if it is what the digest is of."""
+    camera = next((camera for camera in cameras if str(camera.get("id")) == camera_id), None)
+    if camera is None:
+        meanwhile = "" if digest is None else ": it was renamed or removed meanwhile"
+        raise UserError(f"there is no camera {camera_id!a}{meanwhile}")
+    if digest is not None and _digest(camera) != digest:
+        raise UserError(f"camera {camera_id} was changed in the configuration meanwhile: look, and try again")
+    return camera
+
+
+def _cameras_to_change(path: Path, camera_id: str, digest: str | None) -> list[_Entry]:
     """Return all cameras; one of them will get another name or none.
 
     The check of the configuration finds zones and rules that name it, but takes a sound for a file.
     """
     cameras = _cameras(path)
-    if all(str(camera.get("id")) != camera_id for camera in cameras):
-        raise UserError(f"there is no camera {camera_id!a}")
+    _camera_to_change(cameras, camera_id, digest)
     sound = read_content(path).get("sound")
     if isinstance(sound, dict) and sound.get("source") == camera_id:
         raise UserError(f"{path}: sound.source is camera {camera_id}: change it first")

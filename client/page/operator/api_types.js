@@ -39,6 +39,7 @@
  * @property {string} camera
  * @property {string} address without passwords
  * @property {string} substream in which people are tracked, likewise; empty: the camera has none
+ * @property {string} digest tells whether it has changed
  *
  * @typedef {{name: string, fps: number, width: number, height: number, digest: string}} SiteFormat /api/operator/site_settings
  *

@@ -122,4 +122,7 @@ function showSection(requested) {
 addEventListener('hashchange', () => {
   if (openSection !== null) showSection(location.hash.slice(1));
 });
+addEventListener('beforeunload', (event) => {
+  if ([...sections.values()].some(({ isUnsaved }) => isUnsaved)) event.preventDefault(); // the browser asks
+});
 void signIn.signInByLink().then(enter);

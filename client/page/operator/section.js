@@ -6,6 +6,7 @@
  * @typedef {object} Section of the page
  * @property {() => void} open called when it is shown
  * @property {() => void} close called when it is hidden
+ * @property {boolean} [isUnsaved] whether something was entered that would be lost with the page
  */
 
 /** Repeats an asynchronous action at intervals, between start() and stop(), while the page is visible. */

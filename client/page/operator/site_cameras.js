@@ -17,8 +17,10 @@ export class SiteCameras {
   #instead = element('add-instead'); // the camera that gets the address; empty: a new one
   /** @type {HTMLInputElement} */
   #name = element('add-name');
-  /** @type {Map<string, HTMLElement>} by camera, address and substream */
+  /** @type {Map<string, HTMLElement>} by camera */
   #items = new Map();
+  /** @type {Map<string, string>} of the cameras as they are shown, which changes are based on */
+  #digests = new Map();
   #hasResumed = false;
 
   /**
@@ -30,7 +32,12 @@ export class SiteCameras {
     this.fileChanged = fileChanged;
     this.search = new CameraSearch(
       element('camera-search'),
-      { path: 'site_cameras', request: (trial) => this.#wanted(trial), showResult: (answer, aim) => this.#showResult(answer, aim) },
+      {
+        path: 'site_cameras',
+        request: (trial) => this.#wanted(trial),
+        showResult: (answer, aim) => this.#showResult(answer, aim),
+        refused: () => void this.#refresh(),
+      },
       showError,
     );
     this.#instead.addEventListener('change', () => (this.#name.disabled = this.#instead.value !== ''));
@@ -48,7 +55,8 @@ export class SiteCameras {
 
   /** @param {CameraTrial} trial */
   #wanted(trial) {
-    return { ...trial, name: this.#name.value.trim() || trial.name, camera: this.#instead.value };
+    const camera = this.#instead.value;
+    return { ...trial, name: this.#name.value.trim() || trial.name, camera, digest: this.#digests.get(camera) };
   }
 
   /**
@@ -70,13 +78,17 @@ export class SiteCameras {
     const chosen = this.#instead.value;
     const options = cameras.map(({ camera }) => make('option', { value: camera, textContent: camera, selected: camera === chosen }));
     this.#instead.replaceChildren(make('option', { value: '', textContent: 'a new camera' }), ...options);
-    const keyed = cameras.map((camera) => /** @type {const} */ ([JSON.stringify(camera), camera]));
-    this.#items = new Map(keyed.map(([key, camera]) => [key, this.#items.get(key) ?? this.#item(camera)]));
+    this.#digests = new Map(cameras.map(({ camera, digest }) => [camera, digest]));
+    this.#items = new Map(cameras.map(({ camera }) => [camera, this.#items.get(camera) ?? this.#item(camera)]));
+    for (const { camera, address, substream } of cameras) {
+      const about = /** @type {HTMLElement} */ (this.#items.get(camera)?.lastElementChild);
+      setText(about, `${address}${substream && `, people tracked in ${substream}`}`);
+    }
     setChildren(element('site-cameras'), [...this.#items.values()]);
   }
 
-  /** @param {SiteCamera} camera */
-  #item({ camera, address, substream }) {
+  /** @param {string} camera */
+  #item(camera) {
     const field = make('input', { value: camera, maxLength: 32, autocomplete: 'off', spellcheck: false });
     field.setAttribute('aria-label', `Name of camera ${camera}`);
     const rename = make('button', { type: 'submit', textContent: 'Rename' });
@@ -89,21 +101,28 @@ export class SiteCameras {
       event.preventDefault();
       void this.#change('PUT', { camera, name: field.value.trim() });
     });
-    return make('li', { className: 'site-camera' }, form, make('p', { className: 'quiet', textContent: `${address}${substream && `, people tracked in ${substream}`}` }));
+    return make('li', { className: 'site-camera' }, form, make('p', { className: 'quiet' }));
   }
 
   /**
    * @param {'PUT' | 'DELETE'} method
-   * @param {object} content
+   * @param {{camera: string, name?: string}} content
    */
   async #change(method, content) {
     try {
-      this.#show((await requestOperator('site_cameras', method, content)).cameras);
+      const digest = this.#digests.get(content.camera);
+      this.#show((await requestOperator('site_cameras', method, { ...content, digest })).cameras);
       this.showError(null);
       await this.fileChanged();
     } catch (error) {
+      await this.#refresh();
       this.showError(error);
     }
+  }
+
+  /** Show what others have changed. */
+  async #refresh() {
+    await requestOperator('site_cameras').then(({ cameras }) => this.#show(cameras), this.showError);
   }
 }
 
@@ -128,6 +147,10 @@ export class CamerasSection {
     this.tiles.open();
     void this.configured.load();
     void this.settings.load();
+  }
+
+  get isUnsaved() {
+    return this.settings.isUnsaved;
   }
 
   close() {

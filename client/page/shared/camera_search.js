@@ -18,6 +18,7 @@ const SEARCH_TIMEOUT_MS = 30_000;
  * @property {string} path of the request, below api/operator/
  * @property {(trial: CameraTrial) => CameraTrial & TrialAim} request its JSON
  * @property {(answer: any, aim: TrialAim) => Promise<string>} showResult shows the answer; says what has become of the camera
+ * @property {() => void} [refused] called when a trial fails or its camera is refused
  */
 
 export class CameraSearch {
@@ -210,6 +211,7 @@ export class CameraSearch {
       return true;
     } catch (error) {
       const why = this.#explain(error);
+      this.target.refused?.();
       show(`${shown}: ${why.replace(/^\w+:\/\/\S+: /, '')}`, true); // without the address, of which the server shows less
       return false;
     }

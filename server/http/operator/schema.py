@@ -61,6 +61,8 @@ class SiteCamera(msgspec.Struct, frozen=True):
     """Without anything that may be secret."""
     substream: str
     """The same of the stream in which people are tracked; empty: it is the camera's."""
+    digest: str
+    """Tells whether it has changed; changes name it."""
 
 
 class SiteCameras(msgspec.Struct, frozen=True):

@@ -37,6 +37,8 @@ class CameraToAdd(CameraTrial, frozen=True, forbid_unknown_fields=True):
 
     camera: Name = ""
     """The camera that gets the address; empty: it is a new one."""
+    digest: str | None = None
+    """Of that camera, as this change is based on it; null: the change is made whatever it is."""
 
 
 class CameraToRename(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -44,12 +46,16 @@ class CameraToRename(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     camera: Name
     name: Name
+    digest: str | None = None
+    """As in CameraToAdd."""
 
 
 class CameraToRemove(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A camera's id."""
 
     camera: Name
+    digest: str | None = None
+    """As in CameraToAdd."""
 
 
 @routes.get(_PATH)
@@ -68,7 +74,7 @@ async def post_site_camera(request: web.Request, wanted: CameraToAdd) -> web.Res
 async def _try(request: web.Request, wanted: CameraToAdd) -> web.Response:
     try:
         path = config_path(request)
-        is_passed = await asyncio.to_thread(demands_own_video, path, wanted.camera)
+        is_passed = await asyncio.to_thread(demands_own_video, path, wanted.camera, wanted.digest)
     except UserError as error:
         return error_response(409, str(error))
     session = request.app[SETUP]
@@ -76,7 +82,9 @@ async def _try(request: web.Request, wanted: CameraToAdd) -> web.Response:
     tried = await session.try_camera(wanted.addresses(session), wanted.name, passed_into)
     if wanted.camera:
         sizes = _known_sizes(request)
-        return await _answer(request, lambda path: readdress_camera(path, wanted.camera, tried, sizes))
+        return await _answer(
+            request, lambda path: readdress_camera(path, wanted.camera, tried, sizes, wanted.digest)
+        )
     return await _answer(request, lambda path: add_camera(path, tried))
 
 
@@ -84,14 +92,14 @@ async def _try(request: web.Request, wanted: CameraToAdd) -> web.Response:
 @json_body(CameraToRename)
 async def put_site_camera(request: web.Request, wanted: CameraToRename) -> web.Response:
     """Rename a camera in the configuration file."""
-    return await _answer(request, lambda path: rename_camera(path, wanted.camera, wanted.name))
+    return await _answer(request, lambda path: rename_camera(path, wanted.camera, wanted.name, wanted.digest))
 
 
 @routes.delete(_PATH)
 @json_body(CameraToRemove)
 async def delete_site_camera(request: web.Request, wanted: CameraToRemove) -> web.Response:
     """Remove a camera from the configuration file."""
-    return await _answer(request, lambda path: remove_camera(path, wanted.camera))
+    return await _answer(request, lambda path: remove_camera(path, wanted.camera, wanted.digest))
 
 
 async def _answer(request: web.Request, change: Callable[[Path], str | None]) -> web.Response:
@@ -102,7 +110,7 @@ async def _answer(request: web.Request, change: Callable[[Path], str | None]) ->
         listed = await asyncio.to_thread(list_cameras, path)
     except UserError as error:
         return error_response(409, str(error))
-    cameras = [SiteCamera(camera.id, camera.address, camera.substream) for camera in listed]
+    cameras = [SiteCamera(camera.id, camera.address, camera.substream, camera.digest) for camera in listed]
     return json_response(SiteCameras(cameras, note or ""))
 
 

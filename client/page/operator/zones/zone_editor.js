@@ -36,6 +36,8 @@ export class ZoneEditor {
   #rules = [];
   #digest = ''; // of zones and rules, as they are listed
   #openedDigest = ''; // as they were when the form was opened
+  /** @type {ZoneRule[]} on no zone, likewise */
+  #openedRules = [];
   #unit = ''; // on the floor
   #editable = false;
   /** @type {Map<string, CameraDiagnostics['picture']>} by camera */
@@ -99,6 +101,10 @@ export class ZoneEditor {
   open() {
     void this.#load();
     this.#repeater.start();
+  }
+
+  get isUnsaved() {
+    return this.#form.isChanged;
   }
 
   close() {
@@ -197,6 +203,7 @@ export class ZoneEditor {
   #editSiteRules() {
     this.#deselect('');
     this.#openedDigest = this.#digest;
+    this.#openedRules = this.#rules;
     this.#form.openSiteRules(this.#rules, this.#ruleNames(null));
     setText(element('zone-help'), 'These rules apply anywhere on the site.');
   }
@@ -275,8 +282,32 @@ export class ZoneEditor {
     } catch (error) {
       const message = error instanceof Error ? error.message : '';
       setText(this.#state, this.#form.showRefusal(message) ? '' : message);
-      await requestOperator('zones').then((zones) => this.#take(zones), this.showError); // others may have changed them
+      await this.#resolve(method, content);
     }
+  }
+
+  /**
+   * After a refusal, see what others have changed: other zones are no obstacle; the same one is kept as it is drawn here.
+   *
+   * @param {'PUT' | 'DELETE'} method
+   * @param {object} content
+   */
+  async #resolve(method, content) {
+    /** @type {SiteZones | null} */
+    const now = (await requestOperator('zones').catch(this.showError)) ?? null;
+    if (!now || now.unavailable || now.digest === this.#openedDigest) return now && this.#take(now);
+    const [opened, name] = [this.#selected, this.#selected?.zone];
+    const theirs = now.zones.find(({ zone }) => zone === name);
+    const isSame = opened ? !name || isEqual(theirs, opened) : isEqual(now.rules, this.#openedRules);
+    if (opened && name) this.#selected = theirs ?? { ...opened, zone: '' };
+    this.#button('zone-remove').hidden = !this.#selected?.zone;
+    this.#openedDigest = now.digest;
+    this.#openedRules = now.rules;
+    this.#take(now);
+    this.#draw();
+    if (isSame) return await this.#change(method, content);
+    const what = !opened ? 'changed these rules' : theirs ? `changed zone ${name}` : `removed zone ${name}`;
+    setText(this.#state, `Somebody else has ${what} meanwhile. What is entered here is kept: save it, or cancel to see theirs.`);
   }
 
   /** @param {SiteZones} zones in the file */
@@ -296,4 +327,12 @@ export class ZoneEditor {
   #button(id) {
     return element(id);
   }
+}
+
+/**
+ * @param {unknown} one
+ * @param {unknown} other
+ */
+function isEqual(one, other) {
+  return JSON.stringify(one) === JSON.stringify(other);
 }

@@ -24,6 +24,8 @@ export class ZoneForm {
   /** @type {Place | null} */
   #place = null;
   #isNew = true;
+  /** Whether something was drawn or entered since it was opened. */
+  isChanged = false;
   #rules;
   /** @type {HTMLFormElement} */
   #form = element('zone-form');
@@ -42,6 +44,7 @@ export class ZoneForm {
       if (this.shape && this.#place) actions.save(this.#read(this.shape, this.#place));
       else actions.saveSiteRules(this.#rules.read('site'));
     });
+    this.#form.addEventListener('input', () => (this.isChanged = true));
     element('zone-remove').addEventListener('click', actions.remove);
     element('zone-cancel').addEventListener('click', actions.cancel);
     element('zone-add-corner').addEventListener('click', () => this.press(this.#suggestCorner()));
@@ -65,7 +68,7 @@ export class ZoneForm {
     element('zone-y').textContent = ['y', place.unit].filter(Boolean).join(', ');
     element('zone-remove').hidden = this.#isNew;
     element('zone-turn').hidden = shape.kind === 'area';
-    this.#form.hidden = false;
+    this.#form.hidden = this.isChanged = false;
     this.#showCorners();
   }
 
@@ -80,7 +83,7 @@ export class ZoneForm {
     this.#rules.set(rules, null, null, taken);
     this.#showFields(false);
     element('zone-remove').hidden = true;
-    this.#form.hidden = false;
+    this.#form.hidden = this.isChanged = false;
   }
 
   /** @param {boolean} isZone else there is no name and no shape */
@@ -100,6 +103,7 @@ export class ZoneForm {
   close() {
     this.shape = this.#place = null;
     this.#form.hidden = true;
+    this.isChanged = false;
   }
 
   /** @param {Point} point pressed in the drawing */
@@ -119,6 +123,7 @@ export class ZoneForm {
   #change(change) {
     if (!this.shape) return;
     change(this.shape);
+    this.isChanged = true;
     this.#showCorners();
     this.actions.changed();
   }

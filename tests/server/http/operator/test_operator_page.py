@@ -232,12 +232,13 @@ async def test_settings_that_another_operator_has_changed_meanwhile_are_shown(
         save_choice(path, StreamFormatChoice("mall", 12.5, 640, 360))
         await page.get_by_label("Width").fill("320")
         await page.get_by_role("button", name="Change the site").click()
-        await expect(page.locator("#site-state")).to_contain_text(
-            "were changed in the configuration meanwhile"
+        await expect(page.locator("#site-state")).to_have_text(
+            "Somebody else has changed the site meanwhile: name mall, frames a second 12.5. "
+            "What you entered is kept; press again to save it."
         )
         await expect(name).to_have_value("mall")
-        assert load_config(path).site.size == (640, 360)
         await expect(page.get_by_label("Width")).to_have_value("320")
+        assert load_config(path).site.size == (640, 360)
         await page.get_by_label("Width").fill("321")  # what is only invalid stays to be corrected
         await page.get_by_label("Width").evaluate("field => field.step = 1")
         await page.get_by_role("button", name="Change the site").click()
@@ -377,12 +378,12 @@ async def test_a_tile_says_that_a_camera_waits_why_and_until_when(browser: Brows
         served.service.connect_cameras(A)
         served.service.ingest.receive_status(status(A))
         await expect(tile.locator(".state")).to_have_text("Live")
-
         lost = lost_source("Connection refused", 3600.0)
         served.service.ingest.receive_status(status(A, state="away", unavailable=lost))
         await expect(tile.locator(".state")).to_have_text("Waiting")
         line = r"Will be opened again at \d.*: rtsp://10\.0\.0\.9/\.\.\.: Connection refused"
         await expect(tile.locator(".last-error")).to_have_text(re.compile(line))
+
 
 async def test_flags_are_listed_with_their_state(browser: Browser) -> None:
     async with open_operator_page(browser, "#flags") as (served, page):

@@ -8,6 +8,7 @@ from collections.abc import AsyncIterator, Iterator
 from contextlib import aclosing
 from pathlib import Path
 from typing import Any
+from unittest.mock import ANY
 
 import numpy as np
 import pytest
@@ -33,8 +34,8 @@ LOGIN = ("viewer", "p@ss:/w0rd")
 TEXT = "cameras: [{id: c0, source: 'rtsp://viewer:hidden@10.0.0.1/'}, {id: c1, source: 'scene:room'}]\n"
 
 
-def listed(camera: str, address: str, substream: str = "") -> dict[str, str]:
-    return {"camera": camera, "address": address, "substream": substream}
+def listed(camera: str, address: str, substream: str = "") -> dict[str, Any]:
+    return {"camera": camera, "address": address, "substream": substream, "digest": ANY}
 
 
 BEFORE = [listed("c0", "rtsp://10.0.0.1/..."), listed("c1", "scene:room")]
@@ -99,6 +100,28 @@ async def test_a_camera_gets_the_address_of_one_that_was_tried(site: ServedSite,
         {"cameras": [listed("c0", shown), BEFORE[1]], "note": ""},
     )
     assert await send(site, "POST", {**wanted, "camera": "c7"}) == (409, {"error": "there is no camera 'c7'"})
+
+
+async def test_a_change_of_a_camera_that_others_have_changed_meanwhile_is_refused(
+    site: ServedSite, stream: RtspCamera, path: Path
+) -> None:
+    c0, c1 = (camera["digest"] for camera in (await site.get_json(PATH))["cameras"])
+    changed = TEXT.replace("hidden", "other")  # nothing that is shown
+    path.write_text(changed)
+    wanted = {"address": "rtsp://127.0.0.1:9/", "camera": "c0", "digest": c0}
+    refusal = {"error": "camera c0 was changed in the configuration meanwhile: look, and try again"}
+    assert await send(site, "POST", wanted) == (409, refusal), "before it is tried"
+    assert await send(site, "PUT", {"camera": "c0", "name": "door", "digest": c0}) == (409, refusal)
+    assert await send(site, "DELETE", {"camera": "c0", "digest": c0}) == (409, refusal)
+    assert path.read_text() == changed
+    assert (await send(site, "PUT", {"camera": "c1", "name": "hall", "digest": c1}))[0] == 200
+    status, answer = await send(site, "DELETE", {"camera": "c1", "digest": c1})
+    assert (status, answer["error"]) == (409, "there is no camera 'c1': it was renamed or removed meanwhile")
+    now = (await site.get_json(PATH))["cameras"][0]["digest"]
+    login = {"user": LOGIN[0], "password": LOGIN[1]}
+    assert (await send(site, "POST", {"address": stream.url, **login, "camera": "c0", "digest": now}))[
+        0
+    ] == 200
 
 
 async def test_what_is_in_pixels_follows_the_pictures_that_were_tried(

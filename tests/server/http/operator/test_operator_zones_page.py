@@ -243,7 +243,7 @@ async def test_rules_have_schedules_people_and_clear_cameras_on_a_zone_and_anywh
         )  # by another operator
         await page.get_by_role("button", name="Save").click()
         await expect(state).to_contain_text(
-            "were changed in the configuration meanwhile: cancel, and open this"
+            "Somebody else has changed these rules meanwhile. What is entered here is kept"
         )
         await page.get_by_role("button", name="Cancel").click()
         await page.get_by_role("button", name="Rules anywhere").click()
