@@ -93,6 +93,7 @@ async def test_the_cameras_are_listed_with_their_state(site_with_people: ServedS
         "load_level": 2,
         "synchronized": True,
         "message": "",
+        "retry_at": None,
         "condition": "clear",
         "condition_since": None,
         "covered_share": 0.0,

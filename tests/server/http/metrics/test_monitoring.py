@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import pytest
 
 from fakes.paths import CONFIGS
@@ -17,9 +15,8 @@ from fakes.prometheus.monitoring_files import (
 )
 from fakes.prometheus.promql_series import ExportedMetrics, firing_series, select_series, selectors
 from fakes.service.fed_site import ServedSite
-from fakes.service.scripted_cameras import CAMERAS, camera_tracks, status, tracks
+from fakes.service.scripted_cameras import CAMERAS, camera_tracks, lost_source, status, tracks
 from server.config.sections import LinkSettings
-from server.service.ingest.camera_state import Unavailability
 from server.service.other_sites.linked_site import LinkedSite
 
 SEVERITIES = {"critical", "warning", "info"}
@@ -31,9 +28,9 @@ async def printed(served: ServedSite) -> ExportedMetrics:
     link = LinkSettings(connect="tcp/127.0.0.1:1", url="http://yard/")
     served.service.other_sites.sites["yard"] = LinkedSite("yard", link)
     for camera in CAMERAS:
-        served.service.ingest.receive_status(status(camera))
         served.service.ingest.receive_tracks(tracks(camera_tracks(camera, 2, {}, solved_at=1.0)))
-        served.service.ingest.states[camera].unavailable = Unavailability("off", "unopened", time.time() + 60)
+        lost = lost_source("Connection refused", 60.0)
+        served.service.ingest.receive_status(status(camera, state="away", unavailable=lost))
     async with served.session.get("/metrics") as answer:
         assert answer.status == 200
         return ExportedMetrics.of(await answer.text())
