@@ -26,6 +26,7 @@ from server.media.nal_units import nal_units
 from server.setup.trial_messages import StreamRequest, StreamTrial
 from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
+from tracking.image_scaling import scale_image
 
 _OPEN_S, _READ_S = 8.0, 5.0
 _WATCHED_S = 1.5
@@ -154,6 +155,6 @@ def _jpeg(image: np.ndarray[tuple[int, ...], np.dtype[np.uint8]]) -> bytes:
     height, width = image.shape[:2]
     if width > _PICTURE_WIDTH:
         size = (_PICTURE_WIDTH, max(1, round(height * _PICTURE_WIDTH / width)))
-        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+        image = scale_image(image, size)
     is_encoded, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
     return np.asarray(jpeg).tobytes() if is_encoded else b""

@@ -18,6 +18,7 @@ from server.cli.render.plots import new_figure, save_figure
 from server.cli.render.site_file import RenderedSite
 from server.cli.track.command import read_frames
 from server.config.sections import CameraSettings, SiteSettings
+from tracking.image_scaling import scale_image
 
 MOST_CUTS = 12
 """Most cuts shown of a person; later ones are left out."""
@@ -92,7 +93,7 @@ def _read(video: Path, site_info: RenderedSite, camera: str, numbers: Sequence[i
     wanted = set(numbers)
     for number, image in read_frames(source):
         if number in wanted and image is not None:
-            images[number] = np.asarray(cv2.resize(image, site_info.sizes[camera]), dtype=np.uint8)
+            images[number] = scale_image(image, site_info.sizes[camera])
         if number >= numbers[-1]:
             break
     source.close()
@@ -129,8 +130,9 @@ def _plot(
 def _with_box(image: Image, box: NDArray[np.float64]) -> Image:
     """Return a small RGB picture with the (4,) box; NaN: without a box."""
     scale = _WIDTH / image.shape[1]
-    small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    small = scale_image(image, (_WIDTH, max(1, round(image.shape[0] * scale))))
+    rgb = np.asarray(cv2.cvtColor(small, cv2.COLOR_BGR2RGB), dtype=np.uint8)  # a copy: others draw their box
     if not np.isnan(box).any():
         left, top, right, bottom = (round(float(side) * scale) for side in box)
-        cv2.rectangle(small, (left, top), (right, bottom), _GREEN, 2)
-    return np.asarray(cv2.cvtColor(small, cv2.COLOR_BGR2RGB), dtype=np.uint8)
+        cv2.rectangle(rgb, (left, top), (right, bottom), _GREEN, 2)
+    return rgb
