@@ -142,7 +142,7 @@ class _Camera:
         """Return a message with the detections since the one before."""
         if self._observations is None:
             return message
-        return msgspec.structs.replace(message, observations=self._observations.take())
+        return msgspec.structs.replace(message, observations=self._observations.take(message.last))
 
     def shared(self, pulse: int) -> Detections | None:
         """Return the detections of a frame for other cameras; None if the frame was not searched."""

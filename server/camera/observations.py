@@ -55,10 +55,11 @@ class _EpochCollector(Generic[Frame]):
     def __init__(self) -> None:
         self._frames: list[Frame] = []
 
-    def take(self) -> list[Frame]:
-        """Return the frames since the last call."""
-        frames, self._frames = self._frames, []
-        return frames
+    def take(self, last: int) -> list[Frame]:
+        """Remove and return the frames up to the epoch's last; after missed pulses there is a later one."""
+        taken = [frame for frame in self._frames if frame.pulse <= last]
+        self._frames = [frame for frame in self._frames if frame.pulse > last]
+        return taken
 
 
 class RawDetectionCollector(_EpochCollector[RawDetections]):

@@ -303,14 +303,14 @@ class CameraPipeline:
 
     def _add_picture(self, tracks: CameraTracks, image: Image | None) -> CameraTracks:
         """Add the picture's condition and motion, and what the site uses: detections and sharpness."""
-        observations = [] if self._observations is None else self._observations.take()
+        observations = [] if self._observations is None else self._observations.take(tracks.last)
         tracks = msgspec.structs.replace(
             tracks,
             condition=self.view.condition,
             motion=self.view.motion,
             covered=pack_boxes(self.view.hidden),
             observations=observations,
-            detections=[] if self._raw_detections is None else self._raw_detections.take(),
+            detections=[] if self._raw_detections is None else self._raw_detections.take(tracks.last),
         )
         return (
             tracks if self._sharpness is None else self._sharpness.measure(tracks, image, self.tracked.scale)

@@ -50,9 +50,9 @@ class TrackMessageBuilder:
             last=last,
             final_to=last,
             ended=True,
-            shed=_pop_all(self._shed),
-            without_detection=_pop_all(self._without_detection),
-            without_peers=_pop_all(self._without_peers),
+            shed=_pop_until(self._shed, last),
+            without_detection=_pop_until(self._without_detection, last),
+            without_peers=_pop_until(self._without_peers, last),
             tracks=[],
             solve=None,
         )
@@ -67,9 +67,9 @@ class TrackMessageBuilder:
             last=result.last,
             final_to=result.final_to,
             ended=ended,
-            shed=_pop_all(self._shed),
-            without_detection=_pop_all(self._without_detection),
-            without_peers=_pop_all(self._without_peers),
+            shed=_pop_until(self._shed, result.last),
+            without_detection=_pop_until(self._without_detection, result.last),
+            without_peers=_pop_until(self._without_peers, result.last),
             tracks=[track_message(track) for track in result.tracks],
             solve=solver_report(result.report),
             risk_events=[_risk_event(event) for event in result.risk_events[:RISK_EVENTS_MAX]],
@@ -77,10 +77,10 @@ class TrackMessageBuilder:
         )
 
 
-def _pop_all(frames: list[int]) -> list[int]:
-    """Return the frames since the last message, and empty the list."""
-    popped = frames.copy()
-    frames.clear()
+def _pop_until(frames: list[int], last: int) -> list[int]:
+    """Remove and return the frames up to a message's last; after missed pulses there are later ones."""
+    popped = [frame for frame in frames if frame <= last]
+    frames[:] = [frame for frame in frames if frame > last]
     return popped
 
 

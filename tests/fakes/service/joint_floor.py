@@ -114,7 +114,7 @@ def walked_epochs(
                 if start <= last
                 else [],
                 solve=None,
-                observations=collector.take(),
+                observations=collector.take(last),
             )
         if tracks:
             yield Epoch(number, end, tracks)

@@ -22,6 +22,7 @@ from server.config.sections import AccessSettings, SiteSettings
 from server.config.site_config import Config
 from server.messaging.messages import Box, CameraTracks
 from server.messaging.packed_arrays import unpack_boxes, unpack_detections
+from server.service.ingest.validation import is_plausible
 from server.system.errors import UserError
 from synthetic import Scene, write_recording
 
@@ -142,6 +143,16 @@ def test_missed_frames_are_reported_once_and_a_missed_keyframe_begins_a_new_gop(
     ):
         assert sorted(pulse for frames in reported for pulse in frames) == sorted(missed)
     assert [unit.pulse for unit in units if unit.key] == [0, 13, 20, 30, 40]
+
+
+@pytest.mark.parametrize("missed", [range(8, 11), range(9, 13), range(9, 14), range(7, 22)])
+def test_missed_frames_across_the_end_of_an_epoch_leave_its_message_to_be_used(
+    recording: Path, missed: range
+) -> None:
+    """The service refuses messages that list frames of the next epoch: its tracks would be lost."""
+    _, messages = live(config_of(recording), frozenset(missed))
+    assert all(is_plausible(message, STRIDE) for message in messages)
+    assert sorted(pulse for message in messages for pulse in message.shed) == list(missed)
 
 
 def test_only_the_end_of_a_very_long_gap_is_reported(recording: Path) -> None:

@@ -32,10 +32,11 @@ def some_detections(count: int, bins: int, seed: int = 0) -> Detections:
 def test_detections_arrive_as_they_were_found(count: int, bins: int, seed: int) -> None:
     found, collector = some_detections(count, bins, seed), ObservationCollector(Letterbox(SIZE, SIZE))
     collector.add(7, found, None)
-    (sent,) = collector.take()
+    assert collector.take(6) == [], "it is of the next epoch"
+    (sent,) = collector.take(7)
     received = msgspec.msgpack.decode(msgspec.msgpack.encode(sent), type=FrameObservations)
     assert received.pulse == 7
-    assert collector.take() == []
+    assert collector.take(7) == []
     arrived = unpack_observations(received)
     np.testing.assert_allclose(arrived.boxes, found.boxes, atol=0.051)
     np.testing.assert_allclose(arrived.scores, found.scores, atol=0.00051)
@@ -47,7 +48,7 @@ def test_boxes_are_where_they_were_before_the_camera_was_knocked() -> None:
     found, motion = some_detections(3, 0), picture_motion(Motion(x=10.0, y=-4.0).homography(SIZE), SIZE)
     collector = ObservationCollector(Letterbox((1280, 720), SIZE))
     collector.add(0, found, motion)
-    arrived = unpack_observations(collector.take()[0])
+    arrived = unpack_observations(collector.take(7)[0])
     np.testing.assert_allclose(arrived.boxes, 2.0 * (found.boxes - [10.0, -4.0, 10.0, -4.0]), atol=0.051)
 
 
@@ -59,7 +60,7 @@ def test_boxes_that_were_beyond_the_horizon_are_left_out() -> None:
     before = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -0.005, 1.0]])
     collector = ObservationCollector(Letterbox(SIZE, SIZE))
     collector.add(0, found, picture_motion(np.linalg.inv(before), SIZE))
-    (sent,) = collector.take()
+    (sent,) = collector.take(7)
     arrived = unpack_observations(sent)
     assert arrived.scores == pytest.approx([0.5], abs=1e-3)
     assert is_plausible(message(msgspec.structs.replace(sent, pulse=6)), 5)
@@ -69,7 +70,7 @@ def test_of_too_many_detections_the_most_confident_are_sent() -> None:
     found = some_detections(FRAME_DETECTIONS_MAX + 20, 4)
     collector = ObservationCollector(Letterbox(SIZE, SIZE))
     collector.add(0, most_confident(found), None)
-    arrived = unpack_observations(collector.take()[0])
+    arrived = unpack_observations(collector.take(7)[0])
     assert len(arrived) == FRAME_DETECTIONS_MAX
     assert arrived.scores.min() >= np.sort(found.scores)[20] - 0.001
 
