@@ -16,7 +16,6 @@ from tracking.baselines.temporal_consistency.regional_appearance import uv_histo
 from tracking.baselines.temporal_consistency.settings import BlobSettings
 from tracking.boxes import Floats
 from tracking.detectors.base import Image, Mask, Plane
-from tracking.image_scaling import scale_image, working_scale
 
 _INLIERS = 3.0
 """Robust standard deviations from the median within which a sample counts as background."""
@@ -136,7 +135,7 @@ class BlobDetector:
         """
         self._settings, self._sample_s = settings, sample_s
         width, height = size
-        scale = working_scale(size, settings.work_width)
+        scale = min(1.0, settings.work_width / width)
         self.size = max(round(width * scale), 1), max(round(height * scale), 1)
         self.pixels_per_meter = self.size[0] / room_m
         self._min_area = settings.min_area_m2 * self.pixels_per_meter**2
@@ -152,7 +151,9 @@ class BlobDetector:
 
     def resize(self, image: Image) -> Image:
         """Return the image at the working size."""
-        return scale_image(image, self.size)
+        if (image.shape[1], image.shape[0]) == self.size:
+            return image
+        return np.asarray(cv2.resize(image, self.size, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
     def prepare(self, work_images: Sequence[Image]) -> None:
         """Learn the background from working images.

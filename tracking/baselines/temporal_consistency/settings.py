@@ -21,7 +21,7 @@ class BlobSettings:
         ValueError: a setting is out of range.
     """
 
-    work_width: int = 320  # pixels; larger images are resized first, see working_scale
+    work_width: int = 320  # pixels; wider images are resized first
     threshold: float = 5.0  # Mahalanobis distance from the background above which a pixel is foreground
     brightness_floor: float = 6.0  # least standard deviation of the background's brightness, gray levels
     chroma_floor: float = (

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from tracking.detectors.base import Image, Mask, Plane
 from tracking.detectors.ignore_mask import Polygon, visible_mask
-from tracking.image_scaling import scale_image, working_scale
+from tracking.image_scaling import scale_image
 
 
 class CellGrid:
@@ -32,7 +32,7 @@ class CellGrid:
     ) -> None:
         height, width = size
         self._size = size
-        scale = working_scale((width, height), work_width)
+        scale = min(1.0, work_width / width)
         self._work = (max(round(height * scale), cell_pixels), max(round(width * scale), cell_pixels))
         self._cell_pixels = cell_pixels
         self.margin = round(outside * self._work[0] / cell_pixels)

@@ -27,7 +27,7 @@ class BackgroundSettings:
     """
 
     model: Literal["median", "mog2"] = "median"  # how the background is learned
-    work_width: int = 360  # pixels; larger images are resized first, see working_scale
+    work_width: int = 360  # pixels; wider images are resized first
     gray_bins: int = 64  # bins of the gray histograms, 1 to 256
     prescan_s: float = 20.0  # seconds of a recording scanned before its first frame is searched; 0: none
     prescan_every_s: float = 0.8  # seconds between two of the frames that are used
