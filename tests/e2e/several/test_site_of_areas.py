@@ -45,8 +45,8 @@ def at(url: str, number: int) -> str:
     return f"{url}?object={number}"
 
 
-async def is_served_only_by(other: str, url: str, number: int) -> bool:
-    """Return whether a service says that a person is in the area of another one."""
+async def is_visible_at(other: str, url: str, number: int) -> bool:
+    """Return whether the service at `url` says that another one sees a person."""
     return (number, other) in [(one.object, one.server) for one in await elsewhere(url) if one.visible]
 
 
@@ -62,7 +62,7 @@ async def test_who_walks_into_another_area_is_watched_there_under_the_same_numbe
         filming = asyncio.create_task(watch(west, number, tmp_path / "film.mp4", FILM_S))
         await page.goto(at(west, number))
         await page.wait_for_function(PLAYS, timeout=PATIENCE_MS)
-        while not await is_served_only_by(east, west, number):  # noqa: ASYNC110 — a walk has no event
+        while not await is_visible_at(east, west, number):  # noqa: ASYNC110 — a walk has no event
             await asyncio.sleep(0.05)
         assert number not in [one.object for one in await objects(west) if one.visible]
         assert number in [one.object for one in await objects(east) if one.visible]
