@@ -43,6 +43,17 @@ def check_environment(where: str) -> None:
                 raise UserError(f"{where}: environment: {_both_set(outer, name, place)}")
 
 
+def environment_hint(place: Sequence[int | str]) -> str:
+    """Return which variables set something at, in or around a setting's path; empty if none does."""
+    keys = [str(key).lower() for key in place]
+    names = [
+        name
+        for name in sorted(os.environ)
+        if (path := _place(name)) and keys and all(a == b for a, b in zip(path, keys, strict=False))
+    ]
+    return f" (the environment sets {', '.join(names)})" if names else ""
+
+
 def _place(name: str) -> tuple[str, ...] | None:
     """Return the path of a variable's setting; None: it is for something else, like MYVIEW_LOG."""
     if not name.upper().startswith(PREFIX):

@@ -15,7 +15,7 @@ from pydantic_settings import SettingsError
 
 from bestview import ground_handedness, validate_homography
 from server.config.duplicate_keys import DuplicateKeyError, parse_json
-from server.config.environment import check_environment
+from server.config.environment import check_environment, environment_hint
 from server.config.ground_unit import check_unit_spelling
 from server.config.sections import (
     CameraSettings,
@@ -74,7 +74,8 @@ def build_config(content: Mapping[str, Any], *, where: str, folder: Path) -> Con
     try:
         config = Config(**content)
     except ValidationError as error:
-        raise UserError(_one_line(where, error)) from None  # its text repeats keys unredacted
+        # its text repeats keys unredacted
+        raise UserError(_one_line(where, error) + environment_hint(error.errors()[0]["loc"])) from None
     except SettingsError as error:
         raise UserError(f"{where}: environment: {error}; a list, or a whole section, must be JSON") from error
     check_numbers(config.model_dump(), where)

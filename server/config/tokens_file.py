@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import AwareDatetime, Field, ValidationError, model_validator
 
 from server.config.sections.access import Blur
-from server.config.sections.base import Identifier, Section
+from server.config.sections.base import Identifier, Section, matching
 from server.config.values import check_depth_and_texts, redact_and_abbreviate
 from server.config.yaml_file import read_yaml
 from server.system.errors import UserError
@@ -25,9 +25,12 @@ Role = Literal["watch", "operate"]
 class Token(Section):
     """One token and its access rights."""
 
-    name: Annotated[str, Field(min_length=1, max_length=64, pattern=r"^[^\x00-\x1f\x7f]*$")]
+    name: Annotated[
+        str,
+        matching(r"[^\x00-\x1f\x7f]{1,64}", "has 1 to 64 characters that print"),
+    ]
     """The owner's name, which is not secret."""
-    sha256: Annotated[str, Field(pattern=r"^[0-9a-f]{64}$")]
+    sha256: Annotated[str, matching(r"[0-9a-f]{64}", "is not the sum that `myview token` prints")]
     role: Role
     object: Annotated[int, Field(ge=1, le=999_999_999)] | None = None
     """Limits the token to this person's views."""

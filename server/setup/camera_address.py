@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from urllib.parse import quote, unquote, urlsplit, urlunsplit
 
 from server.config.camera_password import PLACEHOLDER
+from server.config.sections.base import IDENTIFIER, IDENTIFIER_RULE
 from server.system.address_redaction import redact_to_host
 from server.system.errors import UserError
 
@@ -19,7 +20,6 @@ _HELP = "enter an address such as rtsp://10.0.0.11/stream1, http://10.0.0.14/vid
 _LOGIN = "its password has a character that ends the login: enter user and password in their own fields"
 _BRACKETS = "an IPv6 address stands in brackets: rtsp://[fe80::1]/stream1"
 _NAME_BREAKS = re.compile(r"[^A-Za-z0-9_-]+")
-_IDENTIFIER = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}")
 _SERVICE = re.compile(r"bestview(-\d+)?")
 _MAX_NAME = 32
 
@@ -141,11 +141,10 @@ def check_name(name: str) -> None:
     Raises:
         UserError: it is invalid.
     """
-    if _IDENTIFIER.fullmatch(name) is None or _SERVICE.fullmatch(name):
-        raise UserError(
-            "a name has letters, digits, - and _, at most 32, begins with a letter or digit, "
-            "and is not bestview"
-        )
+    if not re.fullmatch(IDENTIFIER, name):
+        raise UserError(IDENTIFIER_RULE)
+    if _SERVICE.fullmatch(name):
+        raise UserError(f"a camera is not called {name}, as services are")
 
 
 def free_name(wanted: str, taken: set[str]) -> str:

@@ -10,8 +10,30 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 Polygon = Annotated[list[tuple[float, float]], Field(min_length=3)]
 """Corners in pixels of the camera's own picture."""
 
-Identifier = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_-]{0,31}$")]
+
+def matching(pattern: str, otherwise: str) -> AfterValidator:
+    """Return a validator of texts that match a pattern as a whole; it says ``otherwise`` of others."""
+
+    def check(value: str) -> str:
+        if not re.fullmatch(pattern, value):
+            raise ValueError(otherwise)
+        return value
+
+    return AfterValidator(check)
+
+
+IDENTIFIER = r"[A-Za-z0-9][A-Za-z0-9_-]{0,31}"
+IDENTIFIER_RULE = (
+    "a name has letters from a to z, digits, - and _, at most 32, and begins with a letter or digit"
+)
+
+Identifier = Annotated[str, matching(IDENTIFIER, IDENTIFIER_RULE)]
 """A name that fits into a zenoh key, a URL and a file name."""
+
+PageUrl = Annotated[
+    str, matching(r"https?://[^\s/?#]+(/[^\s?#]*)?", "is not an address such as http://127.0.0.1:8081/")
+]
+"""Base URL of a best-view service."""
 
 
 def _even(value: int) -> int:

@@ -2,34 +2,31 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from typing import Annotated, Self
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import Field, model_validator
 
-from server.config.sections.base import Identifier, Port, Section
+from server.config.sections.base import Identifier, Port, Section, matching
 
+Topic = Annotated[
+    str,
+    Field(max_length=100),
+    matching(
+        r"[A-Za-z0-9_-]+(/[A-Za-z0-9_-]+)*",
+        "is not a topic such as home/cameras: letters, digits, _ and -, between slashes",
+    ),
+]
 
-def _topic(value: str) -> str:
-    if not re.fullmatch(r"[A-Za-z0-9_-]+(/[A-Za-z0-9_-]+)*", value):
-        raise ValueError("is not a topic such as home/cameras: letters, digits, _ and -, between slashes")
-    return value
-
-
-Topic = Annotated[str, Field(max_length=100), AfterValidator(_topic)]
-
-
-def _web_address(value: str) -> str:
-    if not re.fullmatch(r"https?://[^\s/?#]+(/[^\s#]*)?", value):
-        raise ValueError("is not an address such as https://example.org/hook")
-    return value
+WebhookUrl = Annotated[
+    str, matching(r"https?://[^\s/?#]+(/[^\s#]*)?", "is not an address such as https://example.org/hook")
+]
 
 
 class MqttSettings(Section):
     """The connection to an MQTT broker, and Home Assistant's discovery."""
 
-    host: Annotated[str, Field(pattern=r"^[^\s/@]+$")] | None = None
+    host: Annotated[str, matching(r"[^\s/@]+", "is not the name or address of a host")] | None = None
     """Name or address of the broker; None: no MQTT."""
     port: Port = 1883
     username: str | None = None
@@ -60,7 +57,7 @@ class MqttSettings(Section):
 class WebhookSettings(Section):
     """An address to which events are posted, signed by Standard Webhooks 1.0."""
 
-    url: Annotated[str, AfterValidator(_web_address)]
+    url: WebhookUrl
     secret: Path | None = None
     """A file whose one line, whsec_ and base64, signs what is posted; None: not signed."""
     rules: list[Identifier] = []

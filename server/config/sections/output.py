@@ -7,7 +7,7 @@ from typing import Annotated, Self
 
 from pydantic import Field, PositiveFloat, PositiveInt, model_validator
 
-from server.config.sections.base import Section
+from server.config.sections.base import PageUrl, Section
 
 
 class TlsSettings(Section):
@@ -35,7 +35,7 @@ class HttpSettings(Section):
 
     host: str = "127.0.0.1"
     port: Annotated[int, Field(ge=0, le=65535)] = 8080
-    public_url: Annotated[str, Field(pattern=r"^https?://[^\s/?#]+(/[^\s?#]*)?$")] | None = None
+    public_url: PageUrl | None = None
     """Address at which others reach the page: links of webhooks and MQTT begin with it."""
     viewers_max: PositiveInt = 1000
     """Streams served at once, and as many event listeners; one more gets 503, or another viewer's slot."""

@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from server.config.sections.base import Port, Section
+from server.config.sections.base import Port, Section, matching
 from server.config.sections.output import TlsSettings
 
 
@@ -24,7 +24,10 @@ class RtspSettings(Section):
     """Whether clients may ask for UDP; otherwise all is sent over their TCP connection."""
     tls: TlsSettings = TlsSettings()
     """RTSP over TLS (rtsps://): both files or none."""
-    service: Annotated[str, Field(pattern=r"^https?://[^\s/?#@]+/?$")] | None = None
+    service: (
+        Annotated[str, matching(r"https?://[^\s/?#@]+/?", "is not an address such as http://127.0.0.1:8080/")]
+        | None
+    ) = None
     """Address of the best-view service; none: this machine's, as in `http`."""
     certificate: Path | None = None
     """PEM: the service's certificate, if it has HTTPS; none: that of `http.tls`."""

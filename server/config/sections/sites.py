@@ -9,7 +9,7 @@ from typing import Annotated, Self
 from pydantic import Field, PositiveInt, model_validator
 
 from bestview import IdSeries
-from server.config.sections.base import Endpoints, Identifier, Section
+from server.config.sections.base import IDENTIFIER, Endpoints, Identifier, PageUrl, Section
 from server.config.sections.site import ProcessTlsSettings, ZenohSettings
 
 SITES_MAX = 1000
@@ -21,7 +21,7 @@ class LinkSettings(Section):
 
     connect: Endpoints
     """Where its routers listen, as in its `zenoh`."""
-    url: Annotated[str, Field(pattern=r"^https?://[^\s/?#]+(/[^\s?#]*)?$")]
+    url: PageUrl
     """Base URL of its page, to which viewers of its people are sent."""
     users: Path | None = None
     """A file with a line `site-NAME:password`, NAME being this site, that its `zenoh.users` has, too; such a
@@ -81,7 +81,7 @@ def site_user(name: str) -> str:
 
 
 SITE_USER_PREFIX = "site-"
-_SITE_USER = re.compile(rf"{SITE_USER_PREFIX}[A-Za-z0-9][A-Za-z0-9_-]{{0,31}}")
+_SITE_USER = re.compile(SITE_USER_PREFIX + IDENTIFIER)
 
 
 def is_site_user(user: str) -> bool:

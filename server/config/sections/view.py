@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection
 from typing import Annotated, Self
 
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt, model_validator
 
 from bestview import IdentitySettings, IdSeries, QualitySettings
-from server.config.sections.base import Identifier, Section
+from server.config.sections.base import Identifier, PageUrl, Section
 from server.config.unknown_keys import no_unknown_keys
 from tracking.types import RiskReason
 
@@ -60,7 +59,7 @@ class ShardingSettings(Section):
     there. None: every service takes in all cameras."""
     index: NonNegativeInt = 0
     """Index of this service."""
-    servers: list[str] = []
+    servers: list[PageUrl] = []
     """Base URLs of all services, by index; viewers go on there when this one dies. None: `of` services."""
 
     @property
@@ -137,9 +136,6 @@ class ShardingSettings(Section):
             raise ValueError(
                 f"index is {self.index}, but of {self.services} services the last is {self.services - 1}"
             )
-        for number, server in enumerate(self.servers):
-            if not re.fullmatch(r"https?://[^\s/?#]+(/[^\s?#]*)?", server):
-                raise ValueError(f"servers.{number}: is not an address such as http://127.0.0.1:8081/")
         return self
 
 

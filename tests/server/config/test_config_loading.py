@@ -191,6 +191,42 @@ def test_environment_for_an_unknown_section_is_refused(monkeypatch: pytest.Monke
     assert "MYVIEW_HTP__PORT" in error_of(site())
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "error"),
+    [
+        ("MYVIEW_VIEW__SHARE__INDEX", "0", "view.share: unknown key; did you mean 'sharding'?"),
+        ("MYVIEW_HTTP__PORT", "x", "http.port: Input should be a valid integer"),
+        ("MYVIEW_VIEW__SHARDING__INDEX", "3", "view.sharding: index is 3, but of 1 services"),
+        ("MYVIEW_VIEW", '{"share": {"index": 0}}', "view.share: unknown key"),
+    ],
+)
+def test_an_error_says_which_variable_of_the_environment_sets_it(
+    monkeypatch: pytest.MonkeyPatch, name: str, value: str, error: str
+) -> None:
+    monkeypatch.setenv(name, value)
+    monkeypatch.setenv("MYVIEW_SITE__FPS", "10")
+    text = error_of(site())
+    assert error in text
+    assert text.endswith(f" (the environment sets {name})")
+
+
+def test_an_error_of_the_file_does_not_blame_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MYVIEW_HTTP__PORT", "9999")
+    assert "environment" not in error_of(site(view={"share": {"index": 0}}))
+
+
+@pytest.mark.parametrize("name", ["Käse", "the hall", "", 33 * "a", "-a", "a\n"])
+def test_a_name_that_is_refused_is_told_what_a_name_has(name: str) -> None:
+    text = error_of(site(site={"name": name}))
+    assert "a name has letters from a to z, digits, - and _" in text or "more than one line" in text
+
+
+def test_addresses_that_are_refused_are_told_an_example() -> None:
+    hint = "is not an address such as http://127.0.0.1:8081/"
+    assert f"http.public_url: {hint}" in error_of(site(http={"public_url": "hall"}))
+    assert f"view.sharding.servers.0: {hint}" in error_of(site(view={"sharding": {"servers": ["hall"]}}))
+
+
 def test_a_list_from_the_environment_must_be_json(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

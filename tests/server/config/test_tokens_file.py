@@ -34,7 +34,10 @@ def test_a_file_without_tokens_permits_no_access(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("lines", "error"),
     [
-        ([{"name": "a", "sha256": "short", "role": "watch"}], "tokens.0.sha256: String should match pattern"),
+        (
+            [{"name": "a", "sha256": "short", "role": "watch"}],
+            "tokens.0.sha256: is not the sum that `myview token` prints",
+        ),
         (
             [{"name": "a", "sha256": SUM, "role": "own"}],
             "tokens.0.role: Input should be 'watch' or 'operate'",
@@ -60,7 +63,7 @@ def test_a_file_without_tokens_permits_no_access(tmp_path: Path) -> None:
             [{"name": "a", "sha256": SUM, "role": "watch", "made": "2026-11-22"}],
             "tokens.0.made: Input should",
         ),
-        ([{"name": "a\tb", "sha256": SUM, "role": "watch"}], "tokens.0.name: String should match pattern"),
+        ([{"name": "a\tb", "sha256": SUM, "role": "watch"}], "tokens.0.name: has 1 to 64 characters"),
         ([{"name": "a\nb", "sha256": SUM, "role": "watch"}], "tokens.0.name: has more than one line"),
     ],
 )

@@ -198,7 +198,7 @@ def test_a_removed_zone_takes_its_rules_along(path: Path) -> None:
     ("wanted", "error"),
     [
         (change("till"), "zones: two are called 'till'"),
-        (change("", replaces="till"), "the zone: id: String should match pattern"),
+        (change("", replaces="till"), "the zone: id: a name has letters"),
         (change("a/b"), "the zone: id"),
         (change("x", area=AREA[:2]), "the zone: area: List should have at least 3 items"),
         (change("x", area=[(0.0, 0.0)] * 3), "x: area: the corners are all on one line"),
