@@ -129,7 +129,9 @@ class _Camera:
         self.scorer = CrossViewScorer(config, camera, frames.size, 0) if config.peers_of(camera) else None
         site = config.site.size
         self._observations = (
-            ObservationCollector(Letterbox(frames.size, site)) if camera in config.joint_cameras else None
+            ObservationCollector(Letterbox(frames.size, site), config.window.stride)
+            if camera in config.joint_cameras
+            else None
         )
         self._frames = frames
 

@@ -7,6 +7,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from server.camera.load.skipped_frame_interpolator import SkippedFrames
 from server.media.letterbox import Letterbox
 from server.messaging.camera_status import PictureMotion
 from server.messaging.messages import RawDetections
@@ -72,14 +73,33 @@ class RawDetectionCollector(_EpochCollector[RawDetections]):
 
 
 class ObservationCollector(_EpochCollector[FrameObservations]):
-    """Collects the detections of the frames of an epoch for joint tracking."""
+    """Collects the detections of the frames of an epoch for joint tracking.
 
-    def __init__(self, letterbox: Letterbox) -> None:
+    Frames that load shedding skips have interpolated ones, as in the camera's own tracker: joint tracking
+    knows nobody new whom it finds in every second frame only.
+    """
+
+    def __init__(self, letterbox: Letterbox, window_stride: int) -> None:
         super().__init__()
-        self._letterbox = letterbox
+        self._letterbox, self._skipped = letterbox, SkippedFrames(window_stride)
 
     def add(self, pulse: int, detections: Detections, motion: PictureMotion | None) -> None:
         """Add the most confident detections of a frame that was searched."""
+        for skipped, interpolated in self._skipped.take((pulse, detections)):
+            if interpolated is not None:
+                self._append(skipped, interpolated, motion)
+        self._append(pulse, detections, motion)
+
+    def skip(self, pulse: int) -> None:
+        """Add a frame that was skipped."""
+        self._skipped.add(pulse)
+
+    def take(self, last: int) -> list[FrameObservations]:
+        """Remove and return the frames up to the epoch's last; skipped ones at its end are left out."""
+        self._skipped.forget_until(last)
+        return super().take(last)
+
+    def _append(self, pulse: int, detections: Detections, motion: PictureMotion | None) -> None:
         found = calibrated_detections(detections, self._letterbox, motion)
         boxes = pack_detections(found.boxes, found.scores)
         self._frames.append(

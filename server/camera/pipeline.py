@@ -154,7 +154,9 @@ class CameraPipeline:
             CrossViewScorer(config, camera_id, self.source.size, boot) if config.peers_of(camera_id) else None
         )
         self._observations = (
-            ObservationCollector(self._letterbox) if camera_id in config.joint_cameras else None
+            ObservationCollector(self._letterbox, config.window.stride)
+            if camera_id in config.joint_cameras
+            else None
         )
         self._raw_detections = RawDetectionCollector() if config.access.may_blur else None
         self.first_pulse = camera.first_pulse(site.fps) if self.source.recorded else 0
@@ -265,6 +267,8 @@ class CameraPipeline:
             self._messages.add_without_image([pulse])
         if frame.has_detection:
             self._collect(frame)
+        elif frame.skipped and self._observations is not None:
+            self._observations.skip(pulse)
         if self.cross_view is not None and frame.depends_on_peers:
             detections = self.cross_view.rescore(detections, peers.messages, frame.motion)
             if peers.is_incomplete:

@@ -51,7 +51,7 @@ class TrackingBacklog:
         shed = frame is not None and self._frames.qsize() >= self._images_max
         if not self._frames.full():
             now = asyncio.get_running_loop().time()
-            self._frames.put_nowait(QueuedFrame(pulse, None if shed else frame, now, due, skipped))
+            self._frames.put_nowait(QueuedFrame(pulse, None if shed else frame, now, due, skipped or shed))
         return shed
 
     async def end(self) -> None:

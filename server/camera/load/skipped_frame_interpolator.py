@@ -10,6 +10,43 @@ from tracking.interactive import CorrectableTracker, PositionCorrection
 from tracking.registry import Tracker
 
 
+class SkippedFrames:
+    """Frames that wait for the next one with detection, from which theirs are interpolated.
+
+    Frames that are more than ``most`` apart are not interpolated between.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._skipped: list[int] = []
+        self._before: tuple[int, Detections] | None = None
+        """The last frame with detection."""
+
+    def add(self, pulse: int) -> None:
+        """Add a skipped frame. Pulses must ascend."""
+        self._skipped.append(pulse)
+
+    def take(self, after: tuple[int, Detections] | None) -> list[tuple[int, Detections | None]]:
+        """Remove the frames, and return them with their detections; None: these cannot be interpolated.
+
+        ``after`` is the next frame with detection, None if it is not waited for.
+        """
+        taken = [(pulse, self._interpolated(pulse, after)) for pulse in self._skipped]
+        self._skipped = []
+        self._before = self._before if after is None else after
+        return taken
+
+    def forget_until(self, pulse: int) -> None:
+        """Remove the frames up to a pulse."""
+        self._skipped = [skipped for skipped in self._skipped if skipped > pulse]
+
+    def _interpolated(self, pulse: int, after: tuple[int, Detections] | None) -> Detections | None:
+        before = self._before
+        if before is None or after is None or after[0] - before[0] > self._most:
+            return None
+        return interpolate_detections(before[1], after[1], (pulse - before[0]) / (after[0] - before[0]))
+
+
 class SkippedFrameInterpolator:
     """Passes frames to the tracker in order, with interpolated detections for skipped ones.
 
@@ -17,25 +54,18 @@ class SkippedFrameInterpolator:
     """
 
     def __init__(self, tracker: Tracker, bins: int, window_stride: int) -> None:
-        self._tracker, self._no_detections, self._window_stride = (
-            tracker,
-            Detections.empty(bins),
-            window_stride,
-        )
-        self._skipped: list[int] = []
-        self._before: tuple[int, Detections] | None = None
-        """The last frame with detection."""
+        self._tracker, self._no_detections = tracker, Detections.empty(bins)
+        self._window_stride, self._skipped = window_stride, SkippedFrames(window_stride)
 
     def skip(self, pulse: int) -> WindowResult | None:
         """Skip a frame. Pulses must ascend."""
-        self._skipped.append(pulse)
+        self._skipped.add(pulse)
         # The window must not wait for the next frame, which may never come.
         return self._release(None) if (pulse + 1) % self._window_stride == 0 else None
 
     def push(self, pulse: int, detections: Detections, image: Image | None = None) -> WindowResult | None:
         """Push a frame's detections."""
         results = [self._release((pulse, detections)), self._tracker.push(pulse, detections, image)]
-        self._before = pulse, detections
         return merge_results([result for result in results if result is not None])
 
     def apply_corrections(self, corrections: Sequence[PositionCorrection]) -> WindowResult | None:
@@ -53,12 +83,8 @@ class SkippedFrameInterpolator:
 
     def _release(self, after: tuple[int, Detections] | None) -> WindowResult | None:
         """Push the skipped frames; ``after`` is the next frame with detection."""
-        skipped, self._skipped = self._skipped, []
-        results = [self._tracker.push(pulse, self._interpolated(pulse, after)) for pulse in skipped]
+        results = [
+            self._tracker.push(pulse, self._no_detections if found is None else found)
+            for pulse, found in self._skipped.take(after)
+        ]
         return merge_results([result for result in results if result is not None])
-
-    def _interpolated(self, pulse: int, after: tuple[int, Detections] | None) -> Detections:
-        before = self._before
-        if before is None or after is None or after[0] - before[0] > self._window_stride:
-            return self._no_detections
-        return interpolate_detections(before[1], after[1], (pulse - before[0]) / (after[0] - before[0]))

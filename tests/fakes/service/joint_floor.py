@@ -85,7 +85,7 @@ def walked_epochs(
             start = end - stride + 1
             if start > last_of[name] + 1 or (name, number) in absent:
                 continue
-            collector = ObservationCollector(Letterbox(SIZE, SIZE))
+            collector = ObservationCollector(Letterbox(SIZE, SIZE), stride)
             for frame in range(start, last + 1):
                 collector.add(
                     frame, _with_looks(detections[frame - first][name], walks[frame - first], name), None

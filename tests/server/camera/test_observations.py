@@ -19,6 +19,7 @@ from tracking import Detections
 from tracking.detectors.background.motion import Motion
 
 SIZE = (640, 360)
+STRIDE = 5
 
 
 def some_detections(count: int, bins: int, seed: int = 0) -> Detections:
@@ -30,7 +31,7 @@ def some_detections(count: int, bins: int, seed: int = 0) -> Detections:
 
 @given(st.integers(0, 6), st.sampled_from([0, 1, 96]), st.integers(0, 99))
 def test_detections_arrive_as_they_were_found(count: int, bins: int, seed: int) -> None:
-    found, collector = some_detections(count, bins, seed), ObservationCollector(Letterbox(SIZE, SIZE))
+    found, collector = some_detections(count, bins, seed), ObservationCollector(Letterbox(SIZE, SIZE), STRIDE)
     collector.add(7, found, None)
     assert collector.take(6) == [], "it is of the next epoch"
     (sent,) = collector.take(7)
@@ -44,9 +45,24 @@ def test_detections_arrive_as_they_were_found(count: int, bins: int, seed: int) 
         np.testing.assert_allclose(arrived.histograms, found.histograms, atol=0.001)
 
 
+def test_skipped_frames_have_detections_between_those_around_them() -> None:
+    """As in the camera's own tracker; not at an epoch's end, which does not wait, nor across a long gap."""
+    collector = ObservationCollector(Letterbox(SIZE, SIZE), STRIDE)
+    collector.skip(0)
+    for pulse in (1, 4, 13):
+        boxes = np.array([[10.0 + pulse, 20.0, 30.0 + pulse, 80.0]])
+        collector.add(pulse, Detections(boxes, np.array([0.9]), np.zeros((1, 0))), None)
+        for skipped in (pulse + 1, pulse + 2):
+            collector.skip(skipped)
+    sent = collector.take(STRIDE - 1)
+    assert [frame.pulse for frame in sent] == [1, 2, 3, 4]
+    assert [unpack_observations(frame).boxes[0, 0] for frame in sent] == pytest.approx([11, 12, 13, 14])
+    assert [frame.pulse for frame in collector.take(14)] == [13]
+
+
 def test_boxes_are_where_they_were_before_the_camera_was_knocked() -> None:
     found, motion = some_detections(3, 0), picture_motion(Motion(x=10.0, y=-4.0).homography(SIZE), SIZE)
-    collector = ObservationCollector(Letterbox((1280, 720), SIZE))
+    collector = ObservationCollector(Letterbox((1280, 720), SIZE), STRIDE)
     collector.add(0, found, motion)
     arrived = unpack_observations(collector.take(7)[0])
     np.testing.assert_allclose(arrived.boxes, 2.0 * (found.boxes - [10.0, -4.0, 10.0, -4.0]), atol=0.051)
@@ -58,7 +74,7 @@ def test_boxes_that_were_beyond_the_horizon_are_left_out() -> None:
         np.array([[10.0, 20.0, 30.0, 60.0], [10.0, 220.0, 30.0, 300.0]]), np.array([0.5, 0.7]), np.eye(2)
     )
     before = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -0.005, 1.0]])
-    collector = ObservationCollector(Letterbox(SIZE, SIZE))
+    collector = ObservationCollector(Letterbox(SIZE, SIZE), STRIDE)
     collector.add(0, found, picture_motion(np.linalg.inv(before), SIZE))
     (sent,) = collector.take(7)
     arrived = unpack_observations(sent)
@@ -68,7 +84,7 @@ def test_boxes_that_were_beyond_the_horizon_are_left_out() -> None:
 
 def test_of_too_many_detections_the_most_confident_are_sent() -> None:
     found = some_detections(FRAME_DETECTIONS_MAX + 20, 4)
-    collector = ObservationCollector(Letterbox(SIZE, SIZE))
+    collector = ObservationCollector(Letterbox(SIZE, SIZE), STRIDE)
     collector.add(0, most_confident(found), None)
     arrived = unpack_observations(collector.take(7)[0])
     assert len(arrived) == FRAME_DETECTIONS_MAX
