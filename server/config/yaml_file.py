@@ -101,13 +101,20 @@ def _describe(error: yaml.YAMLError) -> str:
 
 def dump_yaml_inline(value: Any) -> str:
     """Dump a value in flow style, for one line after its key, mappings in their own order."""
-    written: str = yaml.dump(value, Dumper=SafeDumper, default_flow_style=True, width=_WIDTH, sort_keys=False)
+    written: str = yaml.dump(
+        value,
+        Dumper=SafeDumper,
+        default_flow_style=True,
+        width=_WIDTH,
+        sort_keys=False,
+        allow_unicode=True,
+    )
     return written.removesuffix("\n...\n").strip()
 
 
 def dump_yaml(content: Any) -> str:
     """Dump a mapping in block style, in its own order."""
-    written: str = yaml.dump(content, Dumper=SafeDumper, sort_keys=False)
+    written: str = yaml.dump(content, Dumper=SafeDumper, sort_keys=False, allow_unicode=True)
     return written
 
 

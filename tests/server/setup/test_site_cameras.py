@@ -195,6 +195,12 @@ def test_a_renamed_camera_keeps_its_settings_calibration_and_password(path: Path
     assert load_config(path).camera("c0") == before.camera("c0")
 
 
+def test_letters_of_any_language_stay_readable_in_a_changed_entry(path: Path) -> None:
+    path.write_text(TEXT.replace("scene:room", "Straße/über.mp4"), encoding="utf-8")
+    rename_camera(path, "c0", "front")
+    assert "Straße/über.mp4" in path.read_text(encoding="utf-8")
+
+
 def test_a_renamed_camera_does_not_get_the_calibration_of_an_earlier_one(path: Path) -> None:
     rename_camera(path, "c1", "old")
     assert load_config(path).camera("old").ground is None

@@ -177,6 +177,12 @@ async def test_the_configuration_shows_differences_and_no_secrets(open_hall: Ser
     assert options["value"] == f"{{{', '.join(f'{name}: (not shown)' for name in names)}}}"
 
 
+def test_letters_of_any_language_are_shown_as_they_are() -> None:
+    config = small_config(cameras=[{"id": A, "source": "Straße/über.mp4"}])
+    [shown] = [setting.value for setting in settings_of(config) if setting.key == f"cameras.{A}.source"]
+    assert shown.endswith("/Straße/über.mp4")
+
+
 @pytest.mark.parametrize(
     "source",
     [
