@@ -74,7 +74,7 @@ class CameraProcess:
         self._tracking = ThreadPoolExecutor(1, "tracking")
         fps = config.site.fps
         self._images_max = max(1, round(config.track.backlog_s * fps))
-        self._backlog = TrackingBacklog(self._images_max)
+        self._backlog = TrackingBacklog(self._images_max, config.track.backlog_s)
         self._limit_log = LogThrottle()
         # Passthrough frames depend on each other, and recordings are shown completely: neither drops frames.
         live = not (self._pipeline.source.recorded or self._pipeline.is_passthrough)
@@ -225,7 +225,7 @@ class CameraProcess:
         detection_times: list[float] = []
         while (item := await self._backlog.get()) is not None:
             pulse, captured, skipped = item.pulse, item.frame, item.skipped
-            if captured is not None and not self._load.detects(pulse):
+            if captured is not None and (self._backlog.is_outdated(item) or not self._load.detects(pulse)):
                 captured, skipped = None, True
                 self._meter.count_skipped_detection()
             began = time.perf_counter()

@@ -35,10 +35,11 @@ class TrackingBacklog:
 
     Args:
         images_max: images that may wait.
+        oldest_s: seconds after its pulse from which a frame is not searched: its tracks would come too late.
     """
 
-    def __init__(self, images_max: int) -> None:
-        self._images_max = images_max
+    def __init__(self, images_max: int, oldest_s: float) -> None:
+        self._images_max, self._oldest_s = images_max, oldest_s
         self.frames_max = _FRAMES_PER_IMAGE * images_max
         """Frames that may wait."""
         self._frames: asyncio.Queue[QueuedFrame | None] = asyncio.Queue(maxsize=self.frames_max)
@@ -53,6 +54,15 @@ class TrackingBacklog:
             now = asyncio.get_running_loop().time()
             self._frames.put_nowait(QueuedFrame(pulse, None if shed else frame, now, due, skipped or shed))
         return shed
+
+    def is_outdated(self, frame: QueuedFrame) -> bool:
+        """Return whether a frame that was got has waited for too long; not if none waits behind it.
+
+        The service waits as long for cameras that are behind. Searches may take longer than frames last, so
+        that a few frames that wait can be too many.
+        """
+        late = asyncio.get_running_loop().time() - frame.due
+        return late > self._oldest_s and not self._frames.empty()
 
     async def end(self) -> None:
         """Add the end of the recording, once there is room."""

@@ -8,6 +8,8 @@ from server.config.site_config import Config
 
 _MAX_AHEAD_S = 60.0
 """Seconds that a camera's pulses may be ahead of this service's, which may have been suspended."""
+_SEARCH_S = 1.0
+"""Seconds from the search of a frame that has waited as long as it may until its tracks arrive."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +34,8 @@ class BufferLengths:
     def of(cls, config: Config) -> BufferLengths:
         """Compute them: frames are buffered until the last camera that is waited for has reported."""
         fps, stride = config.site.fps, config.window.stride
-        grace, backlog = round(config.view.late_after_s * fps), round(config.track.backlog_s * fps)
+        grace = round(config.view.late_after_s * fps)
+        backlog = round((config.track.backlog_s + _SEARCH_S) * fps)
         smooth = round(config.view.smooth_lookahead_s * fps) + config.gop
         frames = max(
             round(config.view.buffer_s * fps),
