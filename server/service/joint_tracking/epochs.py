@@ -60,6 +60,16 @@ def joint_task(epoch: Epoch, cameras: Sequence[str]) -> JointTask:
     )
 
 
+def merge_tasks(tasks: Sequence[JointTask]) -> JointTask:
+    """Return the observations of successive epochs as those of one."""
+    cameras: dict[str, CameraObservations] = {}
+    for task in tasks:
+        for camera, part in task.cameras.items():
+            before = cameras[camera].frames if camera in cameras else []
+            cameras[camera] = msgspec.structs.replace(part, frames=[*before, *part.frames])
+    return JointTask(last=tasks[-1].last, cameras=cameras)
+
+
 def merge_joint_tracks(message: CameraTracks, joint: JointTracks) -> CameraTracks:
     """Return a camera's message with the people who are tracked jointly instead of its own tracks.
 

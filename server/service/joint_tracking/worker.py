@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections import deque
 from collections.abc import Collection
 from itertools import count
 
@@ -13,7 +14,13 @@ from expbackoff import Backoff
 from logthrottle import LogThrottle
 from server.config.site_config import Config
 from server.service.ingest.epoch_aligner import Epoch
-from server.service.joint_tracking.epochs import joint_setup, joint_task, with_joint_tracks, without_tracks
+from server.service.joint_tracking.epochs import (
+    joint_setup,
+    joint_task,
+    merge_tasks,
+    with_joint_tracks,
+    without_tracks,
+)
 from server.service.joint_tracking.joint_messages import JointSetup, JointTask, JointTracks
 from server.system.worker.process import WorkerDiedError, WorkerProcess
 
@@ -26,6 +33,8 @@ _LATE_S, _LATE_MAX_S = 0.6, 5.0
 """Limits of the seconds after which an epoch is decided without joint tracks."""
 _DISAGREEING_M = 0.5
 """Meters of a camera's offset from which on it should be calibrated again."""
+_UNSENT_MAX = 32
+"""Epochs that wait for a process that is late; those of earlier ones are lost."""
 _LATE_FACTOR, _SLOWEST_KEPT = 2.0, 0.95
 """An answer is late that takes so many times as long as the slowest one, of which this share counts for the
 next: on a busy machine answers take longer, and nobody is to vanish there."""
@@ -35,7 +44,8 @@ class JointWorker:
     """Replaces the own tracks of the cameras of the common ground by joint ones, epoch by epoch.
 
     If the process dies it is replaced, and people are known again by where they are and how they look. Until
-    then, and while it is late, epochs have no tracks in these cameras: decisions do not wait. A process that
+    then, and while it is late, epochs have no tracks in these cameras: decisions do not wait, but the
+    process still gets what was observed meanwhile. A process that
     dies again and again is replaced less often.
     """
 
@@ -52,6 +62,8 @@ class JointWorker:
         self._worker: WorkerProcess[JointTracks] | None = None
         self._answer: asyncio.Task[JointTracks] | None = None
         """To the last task, while the process works on it."""
+        self._unsent = deque[JointTask](maxlen=_UNSENT_MAX)
+        """Tasks of epochs that were decided meanwhile: who was seen in them is still to be known."""
         self._least_patience_s = max(_LATE_S, config.track.cross_view_wait_s)
         self._slowest_s = 0.0
         """The slowest of the last answers, seconds."""
@@ -72,9 +84,11 @@ class JointWorker:
         """Return the epoch with joint tracks; unchanged where no cameras are tracked jointly."""
         if self._setup is None:
             return epoch
+        self._unsent.append(joint_task(epoch, self._cameras))
         if not await self._is_idle():
             return without_tracks(epoch, self._joint)
-        task = joint_task(epoch, self._cameras)
+        task = merge_tasks(self._unsent)
+        self._unsent.clear()
         self._answer = asyncio.create_task(self._ask(task, self._setup), name="joint tracking")
         await asyncio.wait({self._answer}, timeout=self._patience_s)
         if not self._answer.done():

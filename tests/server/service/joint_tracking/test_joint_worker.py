@@ -105,6 +105,35 @@ async def test_decisions_do_not_wait_for_a_process_that_is_late(
     assert sum("is late" in record.message for record in caplog.records) == 1
 
 
+@pytest.mark.usefixtures("patient")
+async def test_a_process_that_was_late_knows_what_was_observed_meanwhile(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    config, epochs = joint_config(), list(walked_epochs(walk_past()))[:16]
+    worker, stage = JointWorker(config), JointStage(config)
+    expected = [stage.step(epoch) for epoch in epochs]
+    found = []
+    try:
+        async with asyncio.timeout(PATIENCE):
+            for number, epoch in enumerate(epochs):
+                if number == 4:
+                    assert worker.pid is not None
+                    os.kill(worker.pid, signal.SIGSTOP)
+                    monkeypatch.setattr(worker, "_least_patience_s", 0.01)
+                    worker._slowest_s = 0.0
+                if number == 7:
+                    assert worker.pid is not None
+                    assert worker._answer is not None
+                    os.kill(worker.pid, signal.SIGCONT)
+                    await worker._answer
+                    monkeypatch.setattr(worker, "_least_patience_s", PATIENCE)
+                found.append(await worker.step(epoch))
+    finally:
+        await worker.close()
+    assert [epoch.joint is None for epoch in found] == [4 <= number < 7 for number in range(16)]
+    assert found[8:] == expected[8:]
+
+
 async def test_a_process_that_dies_again_and_again_is_replaced_less_often(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
