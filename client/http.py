@@ -293,7 +293,7 @@ def _error_text(body: bytes) -> str | None:
 
 def _why_away(error: aiohttp.ClientError) -> str:
     """Return in one line why there is no response; aiohttp's text may be long and quote received data."""
-    message = error.message if isinstance(error, aiohttp.ClientResponseError) else str(error)
+    message = "its answer is not valid HTTP" if isinstance(error, aiohttp.ClientResponseError) else str(error)
     if isinstance(error, aiohttp.ClientConnectorError) and not isinstance(error, aiohttp.ClientSSLError):
         number, text = error.os_error.errno, error.os_error.strerror
         # The resolver's errors have numbers below 0, and texts of their own.

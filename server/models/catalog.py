@@ -1,4 +1,4 @@
-"""The networks that can be installed: what they are, their licence, and the package with their weights."""
+"""The networks that can be installed: what they are, their license, and the package with their weights."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class InstallableModel:
     Attributes:
         name: what `detect.onnx.model` and the command line call it.
         title: what it is, in some words.
-        license: the licence of its weights, by its SPDX identifier; "none" if its author has published none.
+        license: the license of its weights, by its SPDX identifier; "none" if its author has published none.
         package: the package that carries its weights.
         files: the files of the package that are converted.
         kind: how it is converted.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import ClassVar
 
 
@@ -23,4 +24,12 @@ def reason_of(error: BaseException, otherwise: str = "") -> str:
     ``otherwise`` replaces other errors' texts, which may repeat what was read.
     """
     reason = getattr(error, "strerror", None)
+    if (
+        isinstance(error, OSError)
+        and error.errno
+        and str(reason).startswith("error while attempting to bind")
+    ):
+        reason = os.strerror(error.errno)  # asyncio's text repeats the address
+    if isinstance(error, UnicodeDecodeError):
+        reason = otherwise or f"it is not {error.encoding.upper()} text"
     return " ".join(str(reason or otherwise or error).split()) or type(error).__name__

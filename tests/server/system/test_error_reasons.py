@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import os
+import socket
 from pathlib import Path
 
 import av
@@ -39,6 +41,20 @@ def test_errors_without_the_systems_words_have_their_text_in_one_line_or_another
         == "it is not text"
     )
     assert reason_of(TimeoutError()) == "TimeoutError"
+
+
+def test_a_file_in_another_encoding_is_said_to_be_so(tmp_path: Path) -> None:
+    path = tmp_path / "site.yaml"
+    path.write_bytes("site: {name: hällo}".encode("latin-1"))
+    with pytest.raises(UnicodeDecodeError) as caught:
+        path.read_text(encoding="utf-8")
+    assert reason_of(caught.value) == "it is not UTF-8 text"
+
+
+async def test_a_port_in_use_is_told_in_the_systems_words_without_the_address() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(OSError, match="in use") as caught:
+        await asyncio.start_server(lambda *_: None, *taken.getsockname())
+    assert reason_of(caught.value) == os.strerror(errno.EADDRINUSE)
 
 
 def test_ffmpegs_words_are_a_reason(tmp_path: Path) -> None:
