@@ -258,8 +258,11 @@ def _homographies(path: Path, where: str) -> tuple[dict[str, list[list[float]]],
     try:
         content = parse_json(path.read_text(encoding="utf-8"))
         matrices = dict(content["homography"].items())
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+    except (OSError, UnicodeDecodeError) as error:
         raise UserError(f"{where}: ground: cannot read {path}: {reason_of(error)}") from error
+    except json.JSONDecodeError as error:
+        reason = f"{error.msg}, line {error.lineno}, column {error.colno}"
+        raise UserError(f"{where}: ground: {path} is not JSON: {reason}") from error
     except DuplicateKeyError as error:
         raise UserError(f"{where}: ground: {path}: {error}") from error
     except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:

@@ -82,7 +82,7 @@ def test_homographies_of_a_ground_file_are_validated(tmp_path: Path) -> None:
     (tmp_path / "ground.json").write_text('{"homography": {"c0": [[1, 0], [0, 1]]}}')
     assert "camera c0" in error_of(site(ground="ground.json"), tmp_path)
     (tmp_path / "ground.json").write_text("not json")
-    assert "cannot read" in error_of(site(ground="ground.json"), tmp_path)
+    assert "is not JSON" in error_of(site(ground="ground.json"), tmp_path)
     assert "No such file" in error_of(site(ground="absent.json"), tmp_path)
 
 
@@ -234,6 +234,12 @@ def test_a_list_from_the_environment_must_be_json(
     assert build_config(site(), where="", folder=Path()).view.flags.reasons == ["optimality_gap"]
     monkeypatch.setenv("MYVIEW_VIEW__FLAGS__REASONS", "optimality_gap")
     assert "a list, or a whole section, must be JSON" in error_of(site())
+
+
+def test_a_ground_file_that_is_not_json_is_said_to_be_so(tmp_path: Path) -> None:
+    (tmp_path / "hall.mp4").write_text("hello\n")
+    assert "ground: " in (text := error_of(site(ground="hall.mp4"), folder=tmp_path))
+    assert text.endswith("hall.mp4 is not JSON: Expecting value, line 1, column 1")
 
 
 def test_paths_are_relative_to_the_configuration(tmp_path: Path) -> None:
