@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.bestview.scenes import BenchmarkScene
 from benchmarks.calibration.calibration_errors import camera_overlaps
+from benchmarks.calibration.joint_identities import joint_idf1, moved_ground
 from benchmarks.common.public_detections import Recording, track
 from bestview.calibration import CalibrationError, WalkSettings, calibrate_from_walks
 from server.cli.calibrate.walk_input import VideoFormat, walks_from_tracks
@@ -67,6 +70,63 @@ def test_no_plane_fits_feet_that_are_hidden_at_random(tmp_path: Path) -> None:
     write_truth(tmp_path, "b", range(80), feet + random.normal(0, HEIGHT, (80, 2)) * (0, 1) + (0, 200))
     residual = camera_overlaps(tmp_path, ("a", "b"), (640, 900))["a", "b"].residual
     assert residual > 0.2
+
+
+def calibrated_hall(folder: Path) -> BenchmarkScene:
+    """Return two cameras, a meter apart and 3 m high, whose detections are the true boxes of two people.
+
+    The horizon is at y = 50, the focal length 500 pixels.
+    """
+    truth = {}
+    for camera, x in (("c0", 0.0), ("c1", 1.0)):
+        truth[camera] = [
+            MotRow(frame + 1, person, *person_box(0.04 * frame - x, distance))
+            for frame in range(50)
+            for person, distance in ((1, 5.0), (2, 8.0))
+        ]
+        write_rows(folder / f"{camera}.txt", truth[camera])
+    matrices = {
+        camera: [[3.0, x, -320.0 * 3.0 - 50.0 * x], [0.0, 0.0, 1500.0], [0.0, 1.0, -50.0]]
+        for camera, x in (("c0", 0.0), ("c1", 1.0))
+    }
+    ground = folder / "ground.json"
+    ground.write_text(json.dumps({"unit": "m", "homography": matrices}))
+    content = {
+        "site": {"name": "hall", "fps": 25, "width": 640, "height": 480},
+        "cameras": [{"id": camera, "source": "scene:none"} for camera in truth],
+        "ground": str(ground),
+    }
+    return BenchmarkScene(
+        "hall", "two views", content, truth, 0.25, {camera: folder / f"{camera}.txt" for camera in truth}
+    )
+
+
+def person_box(x: float, distance: float) -> tuple[float, float, float, float]:
+    """Return left, top, width and height of a person at a place before the camera, meters."""
+    pixels = 500.0 / distance
+    width, height = 0.5 * pixels, 1.7 * pixels
+    return 320.0 + x * pixels - width / 2.0, 50.0 + 3.0 * pixels - height, width, height
+
+
+def test_each_run_moves_the_calibration_in_another_way_and_by_little(tmp_path: Path) -> None:
+    scene = calibrated_hall(tmp_path)
+    ground = Path(scene.content["ground"])
+    given = np.array(json.loads(ground.read_text())["homography"]["c0"])
+    corner, shown = np.array([640.0, 480.0, 1.0]), []
+    for seed in (1, 2):
+        text = moved_ground(ground, scene.sizes, seed)
+        assert text == moved_ground(ground, scene.sizes, seed)
+        moved = json.loads(text)
+        assert moved["unit"] == "m"
+        point = np.linalg.solve(given, np.array(moved["homography"]["c0"]) @ corner)
+        shown.append(point[:2] / point[2])
+        assert 0.0 < np.hypot(*(shown[-1] - corner[:2])) < 2.5  # pixels
+    assert not np.allclose(*shown)
+
+
+def test_people_apart_keep_their_ids_however_the_calibration_is_moved(tmp_path: Path) -> None:
+    found = joint_idf1(calibrated_hall(tmp_path), 2, tmp_path)
+    assert [found.given, *found.moved] == pytest.approx([1.0] * 3, abs=0.06)
 
 
 @pytest.mark.slow
