@@ -25,8 +25,8 @@ _NODE = Path(sys.executable).parent / "node"
 _TSC = ROOT / "node_modules/typescript/bin/tsc"
 _FETCHED = ROOT / "node_modules/.installed"
 """Exists if npm has installed the compiler."""
-_FAST = ("-m", "not slow", "-n", "6", "--dist", "loadfile", "--no-loadscope-reorder")
-"""Six workers for two processors, since sites and browsers wait for frames part of the time."""
+_FAST = ("-m", "not slow", "-n", "5", "--dist", "loadfile", "--no-loadscope-reorder")
+"""Five workers for two processors, since sites and browsers wait for frames part of the time."""
 _SLOW = ("-m", "slow", "--timeout", "1800")
 _OTHER_EXAMPLES = ("-m", "hypothesis and not slow", "-n", "3", "--hypothesis-profile", "new examples")
 _NO_TESTS = 5
