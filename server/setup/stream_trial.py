@@ -17,7 +17,7 @@ from av.video.stream import VideoStream
 from server.camera.passthrough.access_units import parse_packing
 from server.camera.passthrough.compatibility import OR_ENCODE, IncompatibleStreamError, required_format
 from server.camera.passthrough.stream_source import check_stream
-from server.camera.sources.opening import OpenedVideo, open_video
+from server.camera.sources.opening import OpenedVideo, VideoError, open_video
 from server.camera.sources.orientation import parse_orientation, pixel_aspect
 from server.config.loader import load_config
 from server.media.h264.codec import H264
@@ -42,17 +42,17 @@ _NEARLY = 0.04
 
 def run_trial(request: StreamRequest) -> StreamTrial:
     """Open a source and return what it sends, or why nothing arrives."""
-    name = redact_to_host(request.source)
     try:
         opened = open_video(request.source, request.options, (_OPEN_S, _READ_S))
-    except UserError as error:
-        return StreamTrial(error=str(error).removeprefix(f"{name}: "))
+    except VideoError as error:
+        return StreamTrial(error=error.reason)
     try:
         trial = _watch(opened)
     finally:
         opened.container.close()
     if not request.site or trial.error:
         return trial
+    name = redact_to_host(request.source)
     return msgspec.structs.replace(trial, error=_misfit(request).removeprefix(f"{name}: "))
 
 

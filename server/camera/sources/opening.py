@@ -24,6 +24,14 @@ _TEXT = "tty"
 """FFmpeg's format for text files, which it would render as letters."""
 
 
+class VideoError(UserError):
+    """A video cannot be opened, or has no pictures; ``reason`` is the text without the video's name."""
+
+    def __init__(self, name: str, reason: str) -> None:
+        super().__init__(f"{name}: {reason}")
+        self.reason = reason
+
+
 @dataclass(frozen=True, slots=True)
 class OpenedVideo:
     """An open video.
@@ -53,7 +61,7 @@ def open_video(
     """Open the first video stream; ``timeout`` is (seconds to open, seconds to read).
 
     Raises:
-        UserError: it cannot be opened, or there is no video in it.
+        VideoError: it cannot be opened, or there is no video in it.
     """
     name, began = redact_to_host(source), time.monotonic()
     try:
@@ -68,24 +76,24 @@ def open_video(
         if timeout and time.monotonic() - began >= timeout[0]:
             reason = _no_answer(timeout[0])  # whatever FFmpeg makes of its interruption
         # FFmpeg's text contains the address, and so would a chained traceback.
-        raise UserError(f"{name}: cannot open this video: {reason or _reason(source, error)}") from None
+        raise VideoError(name, f"cannot open this video: {reason or _reason(source, error)}") from None
     if container.format.name == _TEXT:
         container.close()
-        raise UserError(
-            f"{name}: this is text, not video; for detections use --det, or `detections` "
-            "next to a camera's source"
+        raise VideoError(
+            name,
+            "this is text, not video; for detections use --det, or `detections` next to a camera's source",
         )
     videos = [
         stream for stream in container.streams.video if not stream.disposition & Disposition.attached_pic
     ]
     if not videos:
         container.close()
-        raise UserError(f"{name}: there is no video in this file")
+        raise VideoError(name, "there is no video in this file")
     stream = videos[0]
     context: VideoCodecContext | None = stream.codec_context  # it may be missing, contrary to PyAV's types
     if context is None or not context.width or not context.height:
         container.close()
-        raise UserError(f"{name}: cannot decode this video: it has no frame size; is the file complete?")
+        raise VideoError(name, "cannot decode this video: it has no frame size; is the file complete?")
     context.thread_count = 1  # one process per camera already uses the cores
     size = (context.width, context.height)
     return OpenedVideo(container, stream, size, frame_rate(stream), stream.frames, len(videos))

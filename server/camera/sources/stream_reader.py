@@ -15,11 +15,10 @@ from av.video.stream import VideoStream
 
 from expbackoff import Backoff
 from logthrottle import LogThrottle
-from server.camera.sources.opening import OpenedVideo, open_video, timeout_message
+from server.camera.sources.opening import OpenedVideo, VideoError, open_video, timeout_message
 from server.camera.sources.stream_clock import StreamClock
 from server.messaging.camera_status import RetryPause
 from server.system.address_redaction import ffmpeg_reason, redact_to_host
-from server.system.errors import UserError
 
 log = logging.getLogger(__name__)
 
@@ -96,8 +95,8 @@ class StreamReader:
     def _connect(self) -> OpenedVideo | None:
         try:
             return open_video(self._url, self._options, (OPEN_S, READ_S))
-        except UserError as error:
-            self._record_away(str(error).removeprefix(f"{self._name}: "))
+        except VideoError as error:
+            self._record_away(error.reason)
             return None
 
     def _read(self, opened: OpenedVideo) -> bool:
