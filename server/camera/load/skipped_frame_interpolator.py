@@ -13,11 +13,11 @@ from tracking.registry import Tracker
 class SkippedFrames:
     """Frames that wait for the next one with detection, from which theirs are interpolated.
 
-    Frames that are more than ``most`` apart are not interpolated between.
+    Between frames that are more than ``longest_gap`` apart none is interpolated.
     """
 
-    def __init__(self, most: int) -> None:
-        self._most = most
+    def __init__(self, longest_gap: int) -> None:
+        self._longest_gap = longest_gap
         self._skipped: list[int] = []
         self._before: tuple[int, Detections] | None = None
         """The last frame with detection."""
@@ -42,7 +42,7 @@ class SkippedFrames:
 
     def _interpolated(self, pulse: int, after: tuple[int, Detections] | None) -> Detections | None:
         before = self._before
-        if before is None or after is None or after[0] - before[0] > self._most:
+        if before is None or after is None or after[0] - before[0] > self._longest_gap:
             return None
         return interpolate_detections(before[1], after[1], (pulse - before[0]) / (after[0] - before[0]))
 
