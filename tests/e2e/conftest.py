@@ -6,8 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from fakes.page.browser import browser
 from fakes.running.stream_frames import FPS
 from synthetic import Scene, write_recording
+
+__all__ = ["browser"]
 
 SECONDS = 12.0
 

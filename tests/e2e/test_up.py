@@ -21,7 +21,6 @@ import pytest_asyncio
 import zenoh
 from playwright.async_api import Browser, Page
 
-from benchmarks.common.browser import chromium
 from client import Gop
 from fakes.page.browser import new_page
 from fakes.programs import needs_chromium
@@ -56,12 +55,6 @@ async def site(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> Asy
     async with running(config) as site:
         await site.until(lambda: bool(site.gops and site.gops[-1].choices), "a person is shown")
         yield site
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
 
 
 @pytest_asyncio.fixture(loop_scope="module")

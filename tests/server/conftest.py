@@ -7,12 +7,13 @@ import os
 import pytest
 
 from fakes.cli.command_line import myview
+from fakes.page.browser import browser
 from fakes.service.fed_site import served, site_with_people
 from fakes.service.vp8_site import vp8_site
 from fakes.timeouts import PATIENCE
 from server.setup import trial_messages
 
-__all__ = ["myview", "served", "site_with_people", "vp8_site"]
+__all__ = ["browser", "myview", "served", "site_with_people", "vp8_site"]
 
 
 @pytest.fixture(autouse=True)

@@ -11,13 +11,22 @@ from typing import Any
 import av
 import numpy as np
 import numpy.typing as npt
+import pytest_asyncio
 from playwright.async_api import Browser, Page, expect
 
+from benchmarks.common.browser import chromium
 from fakes.page.site import FakeSite, SiteServer, serving
 from fakes.page.video_pattern import CAMERAS, FPS, GROUNDS
 from fakes.timeouts import PATIENCE_MS
 
 expect.set_options(timeout=PATIENCE_MS)
+
+
+@pytest_asyncio.fixture(scope="module", loop_scope="module")
+async def browser() -> AsyncIterator[Browser]:
+    """Start one browser for the tests of a module, which run in one loop; each has pages of its own."""
+    async with chromium() as running:
+        yield running
 
 
 @dataclass(frozen=True, slots=True)

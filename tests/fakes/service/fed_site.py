@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
+from pathlib import Path
 from typing import Any
 
 import aiohttp
@@ -11,6 +12,7 @@ import pytest
 
 from fakes.service.scripted_cameras import CAMERAS, LARGE, SMALL, FedService, TrackNumbers, small_config
 from fakes.timeouts import PATIENCE
+from server.config.loader import load_config
 from server.config.running_config import ConfigFileState
 from server.config.sections import HttpSettings
 from server.http.app import make_app, serving
@@ -34,6 +36,12 @@ class ServedSite:
         code, content = await self.get(path)
         assert code == 200
         return content
+
+
+def apply_saved_zones(path: Path, served: ServedSite) -> None:
+    """Put the zones and rules of a configuration file in force, as a reload does."""
+    file, pipeline = load_config(path), served.service
+    pipeline.apply_config(pipeline.config.model_copy(update={"zones": file.zones, "rules": file.rules}))
 
 
 async def serve_site(

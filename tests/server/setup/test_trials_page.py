@@ -9,10 +9,8 @@ from contextlib import asynccontextmanager, closing, suppress
 from pathlib import Path
 
 import pytest
-import pytest_asyncio
 from playwright.async_api import Browser, Page, expect
 
-from benchmarks.common.browser import chromium
 from fakes.media.rtsp_camera import RtspCamera
 from fakes.page.accessibility import page_violations
 from fakes.page.browser import new_page
@@ -27,12 +25,6 @@ from server.setup.session import SetupSession
 from server.setup.trial_messages import StreamRequest, StreamTrial, try_stream
 
 pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
 
 
 @asynccontextmanager

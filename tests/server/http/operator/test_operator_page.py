@@ -6,18 +6,15 @@ import asyncio
 import json
 import re
 import time
-from collections.abc import AsyncIterator
 from contextlib import closing
 from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
-import pytest_asyncio
 import yaml
 from playwright.async_api import Browser, Page, Route, expect
 
-from benchmarks.common.browser import chromium
 from bestview import IdentityRegistry
 from fakes.cli.calibration_walk import SITE, curved_path, errors_on_floor, walk_epochs
 from fakes.http.tokens import token_entry, token_of, write_tokens
@@ -56,12 +53,6 @@ pytestmark = [
     needs_chromium,
     pytest.mark.asyncio(loop_scope="module"),
 ]
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
 
 
 async def test_an_operator_signs_in_and_out_with_a_token(browser: Browser, tmp_path: Path) -> None:

@@ -10,10 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import pytest_asyncio
 from playwright.async_api import Browser, Page, expect
 
-from benchmarks.common.browser import chromium
 from fakes.page.operator_page import (
     check_button_sizes,
     open_operator_page,
@@ -37,12 +35,6 @@ pytestmark = [
 ]
 
 TEXT = "# mine\ncameras: [{id: c0, source: 'scene:room'}, {id: c1, source: 'scene:room'}]\n"
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
 
 
 @pytest.fixture

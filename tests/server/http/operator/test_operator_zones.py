@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from fakes.http.tokens import bearer, serve_with_tokens
-from fakes.service.fed_site import ServedSite, serve_site
+from fakes.service.fed_site import ServedSite, apply_saved_zones, serve_site
 from server.config.loader import load_config
 from server.http.access.csrf import CSRF_HEADER
 from server.http.app_keys import SiteControl
@@ -44,15 +44,9 @@ def path(tmp_path: Path) -> Path:
 
 @pytest.fixture
 async def site(path: Path) -> AsyncIterator[ServedSite]:
-    def reload() -> None:
-        (service,) = served
-        file = load_config(path)
-        service.service.apply_config(
-            service.service.config.model_copy(update={"zones": file.zones, "rules": file.rules})
-        )
-
     served: list[ServedSite] = []
-    async with aclosing(serve_site(control=SiteControl(path, reload=reload))) as sites:
+    control = SiteControl(path, reload=lambda: apply_saved_zones(path, served[0]))
+    async with aclosing(serve_site(control=control)) as sites:
         served.append(await anext(sites))
         yield served[0]
 

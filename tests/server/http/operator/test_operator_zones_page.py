@@ -10,14 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import pytest_asyncio
 from playwright.async_api import Browser, Locator, Page, expect
 
-from benchmarks.common.browser import chromium
 from fakes.page.operator_page import PLAN, check_button_sizes, open_operator_page, serious_faults
 from fakes.paths import AXE
 from fakes.programs import needs_chromium
-from fakes.service.fed_site import A, B, ServedSite, show_people
+from fakes.service.fed_site import A, B, ServedSite, apply_saved_zones, show_people
 from fakes.service.scripted_cameras import CAMERAS, HEIGHT, LARGE, SMALL, WIDTH
 from server.config.loader import load_config
 from server.http.app_keys import SiteControl
@@ -29,12 +27,6 @@ pytestmark = [
 
 TEXT = "# mine\ncameras:  # both\n- {id: c0, source: 'scene:room'}\n- {id: c1, source: 'scene:room'}\n"
 GROUNDS = [{"id": camera, "source": "scene:room", "ground": PLAN, "ground_unit": "m"} for camera in CAMERAS]
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
 
 
 @pytest.fixture
@@ -50,12 +42,7 @@ async def open_zones(
 ) -> AsyncIterator[tuple[ServedSite, Page]]:
     """Open the section of a site with people, which applies the zones and rules of its file on request."""
     served: list[ServedSite] = []
-
-    def reload() -> None:
-        file, pipeline = load_config(path), served[0].service
-        pipeline.apply_config(pipeline.config.model_copy(update={"zones": file.zones, "rules": file.rules}))
-
-    control = SiteControl(path, reload=reload)
+    control = SiteControl(path, reload=lambda: apply_saved_zones(path, served[0]))
     async with open_operator_page(
         browser, "#configuration", axe, patience=120, control=control, **changes
     ) as (site, page):

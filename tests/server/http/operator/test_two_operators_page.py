@@ -7,13 +7,11 @@ from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
 
 import pytest
-import pytest_asyncio
 from playwright.async_api import Browser, Dialog, Page, expect
 
-from benchmarks.common.browser import chromium
 from fakes.page.operator_page import open_operator_page, operator_page
 from fakes.programs import needs_chromium
-from fakes.service.fed_site import ServedSite, show_people
+from fakes.service.fed_site import ServedSite, apply_saved_zones, show_people
 from fakes.timeouts import PATIENCE
 from server.config.loader import load_config
 from server.http.app_keys import SiteControl
@@ -22,12 +20,6 @@ pytestmark = [needs_chromium, pytest.mark.asyncio(loop_scope="module")]
 
 TEXT = "cameras: [{id: c0, source: 'scene:room'}, {id: c1, source: 'scene:room'}]\n"
 ZONE = "zones: [{id: till, camera: c0, area: [[0, 0], [9, 0], [9, 9]]}]\n"
-
-
-@pytest_asyncio.fixture(scope="module", loop_scope="module")
-async def browser() -> AsyncIterator[Browser]:
-    async with chromium() as running:
-        yield running
 
 
 @pytest.fixture
@@ -41,15 +33,9 @@ def path(tmp_path: Path) -> Path:
 async def two_pages(browser: Browser, path: Path, section: str) -> AsyncIterator[tuple[Page, Page]]:
     """Open a section of a site with people in two browsers; saved zones are in force at once."""
     served: list[ServedSite] = []
-
-    def reload() -> None:
-        file, pipeline = load_config(path), served[0].service
-        pipeline.apply_config(pipeline.config.model_copy(update={"zones": file.zones, "rules": file.rules}))
-
+    control = SiteControl(path, reload=lambda: apply_saved_zones(path, served[0]))
     async with AsyncExitStack() as stack:
-        first = open_operator_page(
-            browser, "#configuration", patience=PATIENCE, control=SiteControl(path, reload=reload)
-        )
+        first = open_operator_page(browser, "#configuration", patience=PATIENCE, control=control)
         site, page = await stack.enter_async_context(first)
         served.append(site)
         show_people(site)
